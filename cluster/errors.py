@@ -1,10 +1,8 @@
 """The errors that a command shows to its user: one message, no traceback, and an exit code."""
 
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, ClassVar
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from typing import ClassVar
 
 
 class UserError(Exception):
@@ -19,7 +17,7 @@ class UsageError(UserError):
     exit_code: ClassVar[int] = 2
 
 
-def nearest(unknown: str, known: "Iterable[str]") -> str:
+def nearest(unknown: str, known: Iterable[str]) -> str:
     """Says which of the known names was probably meant.
 
     Args:

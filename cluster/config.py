@@ -1,0 +1,195 @@
+"""The settings: typed sections read from `metadata.svaedc` of a Ray cluster file and from `--set` on the command line.
+
+Every default is here and nowhere else; a driver receives only its own section. Importing this module loads neither Ray nor torch.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+
+from cluster.errors import UsageError, nearest
+
+DEFAULT_FILE = Path("ray_config.yaml")
+"""Read from the working directory when no `--config` is given and it exists."""
+
+UserPath = Annotated[Path, AfterValidator(Path.expanduser)]
+"""A path in which a leading `~` stands for the user's home."""
+
+
+class Section(BaseModel):
+    """What all sections share: they cannot change, and an unknown key is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class RaySettings(Section):
+    """A Ray cluster started by the command itself; unused when it joins a running one."""
+
+    num_cpus: PositiveInt | Literal["all"] = "all"
+    """CPUs the cluster offers; `all` is every CPU this process may use."""
+    object_store_memory: int = Field(default=300_000_000, ge=80_000_000)
+    """Bytes of shared memory for objects; results here are small, so little is needed."""
+    temporary_folder: UserPath = Path("/tmp/ray")
+    """Sockets and logs; short, because a socket's whole path may have 107 characters."""
+    connect_timeout_seconds: PositiveFloat = 5.0
+    """How long a running cluster has to accept a connection."""
+
+
+class CollectSettings(Section):
+    """`svaedc collect`: how rollouts are spread over actors."""
+
+    actors: PositiveInt | Literal["all"] = "all"
+    """Rollout processes, one CPU each; `all` is one per CPU of the cluster."""
+    episodes_per_shard: PositiveInt = 256
+    """Rows of one Parquet file; part of a dataset's identity."""
+    shards_in_flight_per_actor: PositiveInt = 1
+    """Shards handed to an actor ahead of its finishing the first."""
+    attempts_per_shard: PositiveInt = 3
+    """Failures after which a shard is put aside with its error."""
+    shard_timeout_seconds: PositiveFloat = 1800.0
+    """Time after which a shard counts as failed and its actor is replaced."""
+
+    def actor_count(self, cpus: int) -> int:
+        """Rollout actors on a cluster with this many CPUs, at least one."""
+        return max(1, cpus) if self.actors == "all" else self.actors
+
+
+class TrainSettings(Section):
+    """`svaedc train`: where and for how long; what is trained is the preset's business."""
+
+    workers: PositiveInt = 1
+    """Data-parallel training processes, one CPU each; one further CPU must stay free for Ray Train."""
+    stride: PositiveInt = 5
+    """Every how many control steps the model sees one."""
+    time_limit_seconds: PositiveFloat = inf
+    """Training stops after the epoch in which this passes."""
+    cache_folder: UserPath = Path("~/.cache/svaedc").expanduser()
+    """Where shards are decoded into one memory-mapped array, once per dataset."""
+    checkpoint_every_epochs: PositiveInt = 1
+    """Epochs that an interruption may cost."""
+
+
+class CompareSettings(Section):
+    """`svaedc compare`: the simulated BO runs."""
+
+    slots: PositiveInt = 2
+    """Runs at the same time, one CPU each."""
+    pool_size: PositiveInt = 5000
+    """Candidate controllers drawn afresh for every run."""
+    initial_trials: PositiveInt = 2
+    """Random trials before the first suggestion; all methods of a seed share them."""
+
+
+class HardwareSettings(Section):
+    """`svaedc hardware`: campaigns on the one robot."""
+
+    folder: UserPath = Path("campaigns")
+    """Where the journals are, one SQLite file per campaign; on a local disk of the robot's machine."""
+    namespace: str = Field(default="svaedc", min_length=1)
+    """Ray namespace of the one hardware actor; the same for everybody who shares the robot."""
+
+
+class TrackingSettings(Section):
+    """Where MLflow keeps the runs."""
+
+    uri: str = Field(default="sqlite:///mlflow.db", min_length=1)
+    """`sqlite:///FILE` (relative to the working directory) or the address of an MLflow server."""
+    experiment: str = Field(default="svaedc", min_length=1)
+    """The MLflow experiment that holds the runs."""
+
+
+class Settings(Section):
+    """Everything that can be set; each driver receives its section."""
+
+    ray: RaySettings = RaySettings()
+    collect: CollectSettings = CollectSettings()
+    train: TrainSettings = TrainSettings()
+    compare: CompareSettings = CompareSettings()
+    hardware: HardwareSettings = HardwareSettings()
+    tracking: TrackingSettings = TrackingSettings()
+
+
+def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
+    """Reads the settings of one command.
+
+    Args:
+        path: the file given with `--config`, which must exist; without one, `ray_config.yaml` of the working
+            directory is read if it is there.
+        overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the value is
+            a YAML scalar.
+
+    Raises:
+        UsageError: the file is absent or unreadable, a key is unknown, or a value is out of its range.
+    """
+    sections = _sections(path if path is not None else DEFAULT_FILE) if path or DEFAULT_FILE.exists() else {}
+    for override in overrides:
+        _apply(override, sections)
+    try:
+        return Settings.model_validate(sections)
+    except ValidationError as error:
+        origin = f"{path or DEFAULT_FILE} or --set" if overrides else f"{path or DEFAULT_FILE}"
+        raise UsageError(f"{origin}: " + "; ".join(_complaints(error))) from error
+
+
+def _sections(path: Path) -> dict[str, Any]:
+    """The content of `metadata.svaedc`; a section in which everything is commented out reads as empty."""
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(
+            f"cannot read the settings file {path}: {error.strerror}; give an existing file to --config"
+        ) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} is not YAML: {error}") from error
+    metadata = _mapping(document, path, "the file").get("metadata")
+    own = _mapping(_mapping(metadata, path, "metadata").get("svaedc"), path, "metadata.svaedc")
+    return {name: dict(_mapping(keys, path, f"metadata.svaedc.{name}")) for name, keys in own.items()}
+
+
+def _mapping(value: object, path: Path, place: str) -> Mapping[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, dict):
+        raise UsageError(f"{path}: {place} must be a mapping of names to values, got {value!r}")
+    return value
+
+
+def _apply(override: str, sections: dict[str, Any]) -> None:
+    """Writes one `section.key=value` into the sections."""
+    name, equals, text = override.partition("=")
+    section, dot, key = name.strip().partition(".")
+    if not (equals and dot and section and key):
+        raise UsageError(f"--set takes section.key=value, such as train.workers=2, got {override!r}")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise UsageError(f"--set {name}: {text!r} is not a YAML value") from error
+    sections.setdefault(section, {})[key] = value
+
+
+def _complaints(error: ValidationError) -> Iterator[str]:
+    """One sentence per bad key, naming it; a choice such as `number or all` is reported once."""
+    seen = set()
+    for detail in error.errors(include_url=False):
+        place = tuple(str(part) for part in detail["loc"][:2])
+        name = ".".join(place)
+        if name in seen:
+            continue
+        seen.add(name)
+        if detail["type"] == "extra_forbidden":
+            yield f"unknown setting {name!r}, {nearest(name, _known(place))}"
+        else:
+            yield f"{name}: {detail['msg'][0].lower()}{detail['msg'][1:]}, got {detail['input']!r}"
+
+
+def _known(place: Sequence[str]) -> list[str]:
+    """The full names that could have stood where this unknown one stands."""
+    sections = get_type_hints(Settings)
+    names = [
+        f"{section}.{key}" for section in Settings.model_fields for key in sections[section].model_fields
+    ]
+    return names if len(place) > 1 else list(Settings.model_fields)

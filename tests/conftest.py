@@ -1,0 +1,31 @@
+"""Fixtures shared by all tests; the packages are imported inside them, after the run-time type checker is in place."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+# Nothing in a test reports home, and every process has one thread: tests share few cores.
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+os.environ["MLFLOW_DISABLE_TELEMETRY"] = "true"
+os.environ["DO_NOT_TRACK"] = "true"
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@pytest.fixture(scope="session")
+def ray_session():
+    """One local Ray cluster of four logical CPUs for all tests that need one."""
+    from cluster.session import connect
+
+    from cluster.config import RaySettings
+
+    with connect(RaySettings(num_cpus=4, object_store_memory=150_000_000), address=None) as session:
+        yield session
+
+
+@pytest.fixture
+def tracking_settings(tmp_path: Path):
+    """Settings of a fresh MLflow store in a folder of the test's own."""
+    from cluster.config import TrackingSettings
+
+    return TrackingSettings(uri=f"sqlite:///{tmp_path}/store/mlflow.db", experiment="tests")
