@@ -1,6 +1,7 @@
-"""The settings: typed sections read from `metadata.svaedc` of a Ray cluster file and from `--set` on the command line.
+"""The settings: typed sections, read from `metadata.svaedc` of a Ray cluster file and from `--set`.
 
-Every default is here and nowhere else; a driver receives only its own section. Importing this module loads neither Ray nor torch.
+Every default is here and nowhere else; a driver receives only its own section. Importing this module loads
+neither Ray nor torch.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -119,8 +120,8 @@ def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
     Args:
         path: the file given with `--config`, which must exist; without one, `ray_config.yaml` of the working
             directory is read if it is there.
-        overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the value is
-            a YAML scalar.
+        overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the
+            value is a YAML scalar.
 
     Raises:
         UsageError: the file is absent or unreadable, a key is unknown, or a value is out of its range.

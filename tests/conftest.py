@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests; the packages are imported inside them, after the run-time type checker is in place."""
+"""Fixtures shared by all tests; they import the packages inside, after the run-time type checker is in place."""
 
 import os
 from pathlib import Path
@@ -15,9 +15,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 @pytest.fixture(scope="session")
 def ray_session():
     """One local Ray cluster of four logical CPUs for all tests that need one."""
-    from cluster.session import connect
-
     from cluster.config import RaySettings
+    from cluster.session import connect
 
     with connect(RaySettings(num_cpus=4, object_store_memory=150_000_000), address=None) as session:
         yield session
