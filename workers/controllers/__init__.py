@@ -1,0 +1,1 @@
+"""Parametric controllers: a vector in the unit cube becomes commands over time."""

@@ -1,0 +1,49 @@
+"""What a controller is to the control loop, and how x is checked."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from workers.environments.environment import Channel
+
+Command = Callable[[int], Sequence[float]]
+"""From the index of a control step to the command applied in it."""
+
+
+class Controller(ABC):
+    """A family of controllers, one for every x in [0,1]^D."""
+
+    parameters: tuple[Channel, ...]
+
+    @property
+    def dimensions(self) -> int:
+        """D, the length of x."""
+        return len(self.parameters)
+
+    def values(self, x: Float32[np.ndarray, " d"]) -> np.ndarray:
+        """Physical values of the parameters, in the order and units of `parameters`."""
+        low = np.array([parameter.low for parameter in self.parameters])
+        high = np.array([parameter.high for parameter in self.parameters])
+        return low + x.astype(np.float64) * (high - low)
+
+    @abstractmethod
+    def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:
+        """Plan `horizon` steps of the controller x from the environment's present state."""
+
+
+def unit_cube(x: Sequence[float] | np.ndarray, dimensions: int) -> Float32[np.ndarray, " d"]:
+    """x as float32, refused unless it is a finite vector of D numbers in [0, 1].
+
+    Raises:
+        ValueError: naming what is wrong with x.
+    """
+    vector = np.array(x, dtype=np.float32)
+    if vector.shape != (dimensions,):
+        raise ValueError(f"x must have shape ({dimensions},), got {vector.shape}")
+    outside = np.flatnonzero(~((vector >= 0.0) & (vector <= 1.0)))
+    if outside.size:
+        raise ValueError(f"x must lie in [0, 1]; x[{outside[0]}] is {vector[outside[0]]}")
+    return vector

@@ -1,0 +1,146 @@
+"""An arm in front of a table with tall cylinders on it: the scene of the stable push."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from workers.environments.environment import Channel, Environment, Observed
+from workers.physics import Physics
+from workers.simulation.arm import Arm, ArmModel, Vector
+from workers.simulation.cylinder import Cylinder
+from workers.simulation.world import World
+
+
+@dataclass(frozen=True)
+class CylinderModel:
+    """A cylinder of the scene: radius and height in m, start (x, y) in m, nominal physics by name."""
+
+    radius: float
+    height: float
+    start: tuple[float, float]
+    nominal: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class TabletopModel:
+    """Everything that tells one tabletop scene from another.
+
+    Attributes:
+        arm: the robot.
+        torque_limits: N·m, of each moving joint; commands beyond them are clipped.
+        cylinders: the objects to push.
+        control_step: seconds, also the step of the simulation.
+        solver_iterations: of the contact solver in each step.
+    """
+
+    arm: ArmModel
+    torque_limits: tuple[float, ...]
+    cylinders: tuple[CylinderModel, ...]
+    control_step: float
+    solver_iterations: int
+
+    def nominal_physics(self) -> dict[str, float]:
+        """Nominal values of all randomised parameters: `object1_mass` (kg) and so on."""
+        return {
+            f"object{number}_{name}": value
+            for number, cylinder in enumerate(self.cylinders, 1)
+            for name, value in cylinder.nominal.items()
+        }
+
+    def observation(self) -> tuple[Channel, ...]:
+        """Joint angles (rad), then per object its position (m) and two columns of its rotation matrix."""
+        slack = 0.1  # rad; the solver lets joints overshoot their limits a little
+        arm = self.arm
+        joints = [
+            Channel(name, "rad", low - slack, high + slack)
+            for name, low, high in zip(arm.joints, arm.lower, arm.upper, strict=True)
+        ]
+        objects = [c for n in range(1, len(self.cylinders) + 1) for c in _object_channels(f"object{n}")]
+        return (*joints, *objects)
+
+    def action(self) -> tuple[Channel, ...]:
+        """Joint torques in N·m."""
+        limits = zip(self.arm.joints, self.torque_limits, strict=True)
+        return tuple(Channel(name, "N·m", -limit, limit) for name, limit in limits)
+
+
+def _object_channels(name: str) -> list[Channel]:
+    positions = [Channel(f"{name}_{axis}", "m", -3.0, 3.0) for axis in "xyz"]
+    columns = product(("first", "second"), "xyz")
+    return positions + [Channel(f"{name}_{column}_axis_{axis}", "1", -1.0, 1.0) for column, axis in columns]
+
+
+Record = tuple[Vector, Vector, bool, tuple[tuple[Vector, Vector], ...]]
+"""Joint angles, position of the hand, whether the arm touches the table, pose of every object."""
+
+
+class Tabletop(Environment):
+    """The simulated scene of a `TabletopModel`; the table's surface is the plane z = 0."""
+
+    def __init__(self, model: TabletopModel) -> None:
+        self.observation = model.observation()
+        self.action = model.action()
+        self.control_step = model.control_step
+        self._world = World(time_step=model.control_step, solver_iterations=model.solver_iterations)
+        self.arm = Arm(self._world, model.arm)
+        self._cylinders = [
+            Cylinder(self._world, radius=c.radius, height=c.height, position=c.start) for c in model.cylinders
+        ]
+
+    def reset(self, physics: Physics) -> None:
+        """Arm at home, objects at their start, with the dynamics named in `physics`."""
+        for number, cylinder in enumerate(self._cylinders, 1):
+            prefix = f"object{number}_"
+            cylinder.set_dynamics(
+                mass=physics[prefix + "mass"],
+                friction=physics[prefix + "friction"],
+                rolling_friction=physics[prefix + "rolling_friction"],
+                restitution=physics[prefix + "restitution"],
+            )
+        self._world.forget_contacts()
+        self.arm.reset()
+        for cylinder in self._cylinders:
+            cylinder.reset()
+
+    def step(self, command: Sequence[float]) -> Record:
+        """Apply joint torques for one control step."""
+        arm, world = self.arm, self._world
+        arm.apply_torque(command)
+        world.step()
+        state = arm.refresh()
+        poses = tuple([cylinder.pose() for cylinder in self._cylinders])
+        return state.joints, state.position, arm.touches(world.plane), poses
+
+    def observed(self, records: Sequence[Record]) -> Observed:
+        """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T]."""
+        joints, hands, contacts, poses = zip(*records, strict=True)
+        flat = np.array([[(*position, *quaternion) for position, quaternion in pose] for pose in poses])
+        rows = [np.array(joints).T]
+        for number in range(len(self._cylinders)):
+            rows += [flat[:, number, :3].T, first_two_axes(flat[:, number, 3:])]
+        return Observed(
+            xi=np.concatenate(rows).astype(np.float32),
+            signals={"hand_position": np.array(hands).T, "table_contact": np.array(contacts)},
+        )
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._world.close()
+
+
+def first_two_axes(quaternion: Float[np.ndarray, "time 4"]) -> Float[np.ndarray, "6 time"]:
+    """The first two columns of the rotation matrices of quaternions (x, y, z, w): a continuous orientation."""
+    x, y, z, w = quaternion.T
+    return np.stack(
+        [
+            1 - 2 * (y * y + z * z),
+            2 * (x * y + z * w),
+            2 * (x * z - y * w),
+            2 * (x * y - z * w),
+            1 - 2 * (x * x + z * z),
+            2 * (y * z + x * w),
+        ]
+    )

@@ -1,0 +1,1 @@
+"""Robots behind one small driver protocol, and the ledger that counts their motions."""

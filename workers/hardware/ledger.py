@@ -1,0 +1,88 @@
+"""The robot's own append-only record of every motion, written before anything moves."""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from workers.hardware.driver import Measurement, Motion
+
+STARTED = "started"
+ENDED = "ended"
+
+
+class MotionLedger:
+    """One JSON object per line, on disk before `start` or `end` returns; a torn last line never happened.
+
+    Args:
+        path: of the file; its folder must exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def start(self, trial_id: str, x: Float[np.ndarray, " D"]) -> None:
+        """Records that a trial is about to move the robot.
+
+        Raises:
+            RuntimeError: when the ledger already knows the trial: no trial moves a robot twice.
+        """
+        if self.motion(trial_id).started:
+            raise RuntimeError(
+                f"trial {trial_id} has already moved the robot according to {self.path}; "
+                "it is not run again: resolve it, and a repetition gets a trial of its own"
+            )
+        digest = hashlib.sha256(x.astype("<f8").tobytes()).hexdigest()
+        self._append({"event": STARTED, "trial": trial_id, "x": digest, "pid": os.getpid()})
+
+    def end(self, trial_id: str, measurement: Measurement) -> None:
+        """Records that a trial came to its end, and what it measured."""
+        self._append({"event": ENDED, "trial": trial_id, "measurement": asdict(measurement)})
+
+    def motion(self, trial_id: str) -> Motion:
+        """What is known of one trial."""
+        entries = [entry for entry in self.entries() if entry["trial"] == trial_id]
+        ends = [Measurement(**entry["measurement"]) for entry in entries if entry["event"] == ENDED]
+        return Motion(any(entry["event"] == STARTED for entry in entries), ends[-1] if ends else None)
+
+    def entries(self) -> list[dict[str, object]]:
+        """Every complete line, oldest first."""
+        if not self.path.exists():
+            return []
+        # A crash can leave half a line, even one that a later append closed with a newline.
+        return [entry for line in self.path.read_bytes().split(b"\n") if (entry := _parsed(line)) is not None]
+
+    def _append(self, entry: dict[str, object]) -> None:
+        line = json.dumps(entry, sort_keys=True, allow_nan=False).encode() + b"\n"
+        is_new = not self.path.exists()
+        with self.path.open("ab+") as file:
+            if file.tell() > 0:
+                file.seek(-1, os.SEEK_END)
+                # The torn line of a crash must not swallow this one.
+                line = line if file.read(1) == b"\n" else b"\n" + line
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+        if is_new:
+            _sync_folder(self.path.parent)
+
+
+def _parsed(line: bytes) -> dict[str, object] | None:
+    try:
+        entry = json.loads(line)
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) else None
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes a new file's name durable, not only its bytes."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,67 @@
+"""The rehearsal robot: a simulated setup with hidden physics that stands in for the real one."""
+
+import hashlib
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from workers.hardware.driver import Measurement, Motion, RobotFault
+from workers.hardware.ledger import MotionLedger
+from workers.randomness import generator
+from workers.rollout import rollout
+from workers.setups import Setup
+
+LEDGER = "starts.jsonl"
+
+
+class RehearsalRobot:
+    """A setup whose physics is drawn once from the wide gap and never shown to the campaign.
+
+    Args:
+        name: of the robot, as in the registry.
+        setup: what is simulated.
+        seed: of the campaign; the hidden physics follows from it alone.
+        pace: least duration of a trial in s; 0 runs as fast as the simulation.
+        folder: where the ledger of physical starts lies.
+
+    Raises:
+        ValueError: when pace is negative.
+    """
+
+    def __init__(self, name: str, setup: Setup, seed: int, pace: float, folder: Path) -> None:
+        if pace < 0.0:
+            raise ValueError(f"pace must be at least 0 s, got {pace}")
+        self.name = name
+        self.setup = setup.name
+        self._simulated = setup
+        self._physics = setup.gaps["wide"].draw(generator(seed, "hidden-physics", 0))
+        self._pace = pace
+        self._ledger = MotionLedger(folder / LEDGER)
+        self._stopped = threading.Event()
+
+    def run(self, trial_id: str, x: Float[np.ndarray, " D"]) -> Measurement:
+        """Rolls x out once under the hidden physics; see `RobotDriver.run`."""
+        began = time.monotonic()
+        if self._stopped.is_set():
+            raise RobotFault(f"trial {trial_id} was not started: the robot has been stopped")
+        self._ledger.start(trial_id, x)
+        with self._simulated.open() as simulation:
+            episode = rollout(self._simulated, simulation, x.astype(np.float32), self._physics)
+        if self._stopped.wait(max(0.0, self._pace - (time.monotonic() - began))):
+            raise RobotFault(f"trial {trial_id} was stopped before its end")
+        evidence = hashlib.sha256(episode.xi.tobytes()).hexdigest()
+        seconds = time.monotonic() - began
+        measurement = Measurement(float(episode.f), float(episode.y), episode.stop, seconds, evidence)
+        self._ledger.end(trial_id, measurement)
+        return measurement
+
+    def stop(self) -> None:
+        """Ends the trial under way as a fault, and every later one before it starts."""
+        self._stopped.set()
+
+    def motion(self, trial_id: str) -> Motion:
+        """What the ledger of physical starts says of a trial."""
+        return self._ledger.motion(trial_id)

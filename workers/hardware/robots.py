@@ -1,0 +1,51 @@
+"""The robots known by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+
+from workers import setups
+from workers.hardware.driver import RobotDriver
+from workers.hardware.rehearsal import RehearsalRobot
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What is known of a robot before it is connected.
+
+    Attributes:
+        name: in the registry.
+        setup: name of the setup it realises.
+        connect: (seed, pace in s, folder for its ledger) -> the driver.
+    """
+
+    name: str
+    setup: str
+    connect: Callable[[int, float, Path], RobotDriver]
+
+
+def _rehearsal(name: str, setup: str) -> Robot:
+    def connect(seed: int, pace: float, folder: Path) -> RobotDriver:
+        return RehearsalRobot(name, setups.load(setup), seed, pace, folder)
+
+    return Robot(name, setup, connect)
+
+
+ROBOTS: Mapping[str, Robot] = MappingProxyType(
+    {robot.name: robot for robot in (_rehearsal("franka-rehearsal", "franka"),)}
+)
+
+
+def find(name: str) -> Robot:
+    """The robot of that name.
+
+    Raises:
+        LookupError: when there is none; the message names the nearest.
+    """
+    if name not in ROBOTS:
+        close = get_close_matches(name, ROBOTS, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(ROBOTS))}"
+        raise LookupError(f"unknown robot {name!r}; {hint}")
+    return ROBOTS[name]

@@ -1,0 +1,104 @@
+"""The control loop, the only one in this project: one controller, one episode."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32, UInt8
+
+from workers.controllers.controller import unit_cube
+from workers.environments.environment import Channel, Environment, Observed
+from workers.physics import Physics
+from workers.randomness import generator
+from workers.setups import Setup
+
+VERSION = 1
+"""Part of a dataset's identity: raise it whenever an episode's bytes change."""
+
+DIVERGED = "diverged"
+
+
+@dataclass(frozen=True)
+class Episode:
+    """The record of one rollout.
+
+    Attributes:
+        x: the controller, in [0,1]^D.
+        xi: the trajectory ξ, in the units of the setup's channels.
+        bad: per step, one bit for each bad condition.
+        y: badness, the fraction of bad steps, in [0, 1].
+        f: the objective.
+        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded.
+        physics: the parameters it ran under.
+    """
+
+    x: Float32[np.ndarray, " d"]
+    xi: Float32[np.ndarray, "obs time"]
+    bad: UInt8[np.ndarray, " time"]
+    y: float
+    f: float
+    stop: str
+    physics: Mapping[str, float]
+
+
+def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Physics) -> Episode:
+    """Run controller x for the setup's horizon under the given physics.
+
+    Raises:
+        ValueError: when x is not a vector of D numbers in [0, 1].
+    """
+    controller = unit_cube(x, setup.dimensions)
+    environment.reset(physics)
+    command = setup.controller.start(controller, environment, setup.horizon)
+    step = environment.step
+    records = [step(command(t)) for t in range(setup.horizon)]
+    return _episode(setup, environment.observed(records), controller, physics)
+
+
+def random_episode(setup: Setup, environment: Environment, seed: int, index: int) -> Episode:
+    """Episode `index` of the dataset with that seed: its controller and physics depend on nothing else."""
+    x = generator(seed, "controller", index).random(setup.dimensions, dtype=np.float32)
+    return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
+
+
+def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) -> Episode:
+    sane = _sane_steps(observed.xi, setup.observation)
+    if sane < setup.horizon:
+        return _diverged(setup, observed, sane, x, physics)
+    is_bad = setup.task.is_bad(observed)
+    return Episode(
+        x=x,
+        xi=observed.xi,
+        bad=_bits(is_bad),
+        y=float(is_bad.any(axis=0).mean()),
+        f=float(np.float32(setup.task.objective(observed, is_bad))),
+        stop="",
+        physics=physics,
+    )
+
+
+def _diverged(setup: Setup, observed: Observed, sane: int, x: np.ndarray, physics: Physics) -> Episode:
+    """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
+    xi = observed.xi.copy()
+    if sane == 0:
+        xi[:] = np.array([(channel.low + channel.high) / 2 for channel in setup.observation])[:, None]
+    else:
+        xi[:, sane:] = xi[:, sane - 1 : sane]
+    bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
+    return Episode(x, xi, bad, 1.0, float(np.float32(setup.objective_limits[0])), DIVERGED, physics)
+
+
+def _sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...]) -> int:
+    """How many steps pass before a channel leaves its bounds or is not a number."""
+    slack = 1e-5  # float32 rotation matrices
+    low = np.array([channel.low for channel in channels], dtype=np.float32)[:, None] - slack
+    high = np.array([channel.high for channel in channels], dtype=np.float32)[:, None] + slack
+    insane = np.flatnonzero(~((xi >= low) & (xi <= high)).all(axis=0))
+    return int(insane[0]) if insane.size else xi.shape[1]
+
+
+def _bits(is_bad: Bool[np.ndarray, "conditions time"]) -> UInt8[np.ndarray, " time"]:
+    """One bit per condition, the first condition lowest."""
+    return np.packbits(is_bad, axis=0, bitorder="little")[0]
+
+

@@ -1,0 +1,79 @@
+"""Setups by name: an environment, a controller and a task that belong together."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+
+from workers.controllers.controller import Controller
+from workers.environments.environment import Channel, Environment
+from workers.physics import PhysicsRanges
+from workers.tasks.task import Task
+
+MODULES = {
+    "franka": "workers.environments.franka",
+}
+"""A new robot is one module that offers `setup()`, and one line here."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A robot, its controller and its task.
+
+    Attributes:
+        name: as on the command line.
+        build: makes the simulated environment.
+        controller: the parametric controller.
+        task: G_bad and the objective.
+        observation: the channels of ξ.
+        horizon: T, control steps of an episode.
+        control_step: seconds of each.
+        physics: ranges of data collection.
+        gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
+        objective_limits: the range of f, fixed; BO scales f by it.
+        success: an episode with f above this succeeded.
+    """
+
+    name: str
+    build: Callable[[], Environment]
+    controller: Controller
+    task: Task
+    observation: tuple[Channel, ...]
+    horizon: int
+    control_step: float
+    physics: PhysicsRanges
+    gaps: Mapping[str, PhysicsRanges]
+    objective_limits: tuple[float, float]
+    success: float
+
+    @property
+    def dimensions(self) -> int:
+        """D, the length of x."""
+        return self.controller.dimensions
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the bad conditions, in the order of their bits."""
+        return self.task.conditions
+
+    def open(self) -> Environment:
+        """Start the simulated environment; close it, or use it in a `with` block."""
+        return self.build()
+
+    def gap(self, level: str) -> PhysicsRanges:
+        """Ranges of a sim-to-real gap level; an unknown one raises `LookupError` and names the nearest."""
+        return self.gaps[known(level, "gap level", self.gaps)]
+
+
+def known(name: str, kind: str, names: Mapping[str, object]) -> str:
+    """The name itself if it is one of the names; otherwise a `LookupError` that suggests the nearest."""
+    if name in names:
+        return name
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    raise LookupError(f"unknown {kind} {name!r}; {hint}known: {', '.join(names)}")
+
+
+def load(name: str) -> Setup:
+    """The setup of that name; an unknown one raises `LookupError` and names the nearest."""
+    return import_module(MODULES[known(name, "setup", MODULES)]).setup()

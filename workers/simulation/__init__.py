@@ -1,0 +1,1 @@
+"""PyBullet behind words of the domain; no other package imports it."""

@@ -1,0 +1,191 @@
+"""A torque-controlled arm bolted to the world: joints in, torques out, kinematics and dynamics on request."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pybullet
+import pybullet_data
+
+from workers.simulation.world import World
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """One reading of an arm.
+
+    Attributes:
+        joints: angles in rad.
+        speeds: angular speeds in rad/s.
+        position: origin of the hand's frame in m, in the world.
+        orientation: of the hand's frame, quaternion (x, y, z, w).
+        velocity: of that origin in m/s.
+        angular_velocity: of the hand in rad/s.
+    """
+
+    joints: Vector
+    speeds: Vector
+    position: Vector
+    orientation: Vector
+    velocity: Vector
+    angular_velocity: Vector
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """What is needed to load an arm and to move it.
+
+    Attributes:
+        urdf: path below the folder of robots that ships with PyBullet, or an absolute path.
+        joints: names of the joints that move, base to tip; names and limits refuse what the URDF does not hold.
+        lower: lower joint limits in rad.
+        upper: upper joint limits in rad.
+        home: joint angles at reset in rad.
+        joint_damping: N·m·s/rad at each moving joint.
+        hand: name of the joint that carries the link whose frame is the hand.
+        fingers: names of the prismatic joints held shut, whose links touch nothing.
+        finger_force: N that holds each of them.
+    """
+
+    urdf: str
+    joints: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    home: tuple[float, ...]
+    joint_damping: float
+    hand: str
+    fingers: tuple[str, ...]
+    finger_force: float
+
+    def __post_init__(self) -> None:
+        """Refuse limits and home poses that do not fit the joints."""
+        for name in ("lower", "upper", "home"):
+            if len(getattr(self, name)) != len(self.joints):
+                raise ValueError(
+                    f"{name} must hold one angle per joint ({len(self.joints)}), got {len(getattr(self, name))}"
+                )
+        for joint, low, start, high in zip(self.joints, self.lower, self.home, self.upper, strict=True):
+            if not low <= start <= high:
+                raise ValueError(f"home of {joint} must lie within [{low}, {high}] rad, got {start}")
+
+
+class Arm:
+    """An arm in a world, at its home pose after `reset`."""
+
+    def __init__(self, world: World, model: ArmModel) -> None:
+        self._world = world
+        self._client = world.client
+        self._model = model
+        self.body = self._load(model.urdf)
+        index = self._joint_indices()
+        missing = [name for name in (*model.joints, model.hand, *model.fingers) if name not in index]
+        if missing:
+            raise ValueError(f"{model.urdf} has no joint {missing[0]!r}; it has {', '.join(index)}")
+        self._joints = [index[name] for name in model.joints]
+        self._fingers = [index[name] for name in model.fingers]
+        self._hand = index[model.hand]
+        self._rest = [0.0] * (len(self._joints) + len(self._fingers))
+        self._finger_rest = (0.0,) * len(self._fingers)
+        self._configure()
+        self.state = self._read()
+
+    def _load(self, urdf: str) -> int:
+        path = Path(pybullet_data.getDataPath()) / urdf
+        if not path.exists():
+            raise FileNotFoundError(f"no robot description at {path}")
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        return pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=self._client)
+
+    def _joint_indices(self) -> dict[str, int]:
+        count = pybullet.getNumJoints(self.body, physicsClientId=self._client)
+        infos = (pybullet.getJointInfo(self.body, i, physicsClientId=self._client) for i in range(count))
+        return {info[1].decode(): info[0] for info in infos}
+
+    def _configure(self) -> None:
+        model = self._model
+        for joint, low, high in zip(self._joints, model.lower, model.upper, strict=True):
+            pybullet.changeDynamics(
+                self.body,
+                joint,
+                jointLowerLimit=low,
+                jointUpperLimit=high,
+                jointDamping=model.joint_damping,
+                physicsClientId=self._client,
+            )
+        self._world.make_intangible(self.body, self._fingers)
+
+    def reset(self) -> None:
+        """Put the arm to its home pose, at rest, with its motors off and its fingers shut."""
+        for joint, angle in zip(self._joints, self._model.home, strict=True):
+            pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self._client)
+        for joint in self._fingers:
+            pybullet.resetJointState(self.body, joint, 0.0, 0.0, physicsClientId=self._client)
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._joints,
+            pybullet.VELOCITY_CONTROL,
+            forces=[0.0] * len(self._joints),
+            physicsClientId=self._client,
+        )
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._fingers,
+            pybullet.POSITION_CONTROL,
+            targetPositions=self._finger_rest,
+            forces=[self._model.finger_force] * len(self._fingers),
+            physicsClientId=self._client,
+        )
+        self.state = self._read()
+
+    def apply_torque(self, torque: Sequence[float]) -> None:
+        """Set the joint torques, in N·m, of the next step."""
+        pybullet.setJointMotorControlArray(
+            self.body, self._joints, pybullet.TORQUE_CONTROL, forces=torque, physicsClientId=self._client
+        )
+
+    def refresh(self) -> ArmState:
+        """Read the arm after a step."""
+        self.state = self._read()
+        return self.state
+
+    def _read(self) -> ArmState:
+        joints = pybullet.getJointStates(self.body, self._joints, physicsClientId=self._client)
+        link = pybullet.getLinkState(
+            self.body, self._hand, 1, 1, physicsClientId=self._client
+        )  # without forward kinematics Bullet answers with the poses of one step before
+        (vx, vy, vz), (wx, wy, wz) = link[6], link[7]  # of the centre of mass
+        dx, dy, dz = (frame - com for frame, com in zip(link[4], link[0], strict=True))
+        return ArmState(
+            tuple(joint[0] for joint in joints),
+            tuple(joint[1] for joint in joints),
+            link[4],
+            link[5],
+            (vx + wy * dz - wz * dy, vy + wz * dx - wx * dz, vz + wx * dy - wy * dx),
+            link[7],
+        )
+
+    def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
+        """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
+        angles = (*self.state.joints, *self._finger_rest)
+        return pybullet.calculateJacobian(
+            self.body, self._hand, (0.0, 0.0, 0.0), angles, self._rest, self._rest, physicsClientId=self._client
+        )
+
+    def gravity_torque(self) -> Vector:
+        """Torques, in N·m, that hold the arm still against gravity, Coriolis and centrifugal forces."""
+        return pybullet.calculateInverseDynamics(
+            self.body,
+            (*self.state.joints, *self._finger_rest),
+            (*self.state.speeds, *self._finger_rest),
+            self._rest,
+            physicsClientId=self._client,
+        )
+
+    def touches(self, body: int) -> bool:
+        """Whether any link but the base is in contact with the body."""
+        for contact in pybullet.getContactPoints(self.body, body, physicsClientId=self._client):
+            if contact[3] >= 0 and contact[8] < 0.0:
+                return True
+        return False

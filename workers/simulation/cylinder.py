@@ -1,0 +1,58 @@
+"""A solid cylinder that stands on the ground and may be pushed over."""
+
+import pybullet
+
+from workers.simulation.world import World
+
+_MARGIN = 1e-3  # m; Bullet keeps this gap, so a body set down without it jumps
+
+
+class Cylinder:
+    """A free cylinder, upright at its start pose after `reset`.
+
+    Args:
+        world: where it stands.
+        radius: in m.
+        height: in m.
+        position: (x, y) of its axis at reset, in m.
+    """
+
+    def __init__(self, world: World, *, radius: float, height: float, position: tuple[float, float]) -> None:
+        self._client = world.client
+        self._radius = radius
+        self._height = height
+        self._start = (*position, height / 2 + _MARGIN)
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
+        )
+        self.body: int = pybullet.createMultiBody(1.0, shape, -1, self._start, physicsClientId=self._client)
+
+    def set_dynamics(
+        self, *, mass: float, friction: float, rolling_friction: float, restitution: float
+    ) -> None:
+        """Set mass (kg) and contact coefficients; the inertia is that of a solid cylinder.
+
+        Bullet's own inertia of a cylinder is that of its bounding box.
+        """
+        across = mass * (3 * self._radius**2 + self._height**2) / 12
+        pybullet.changeDynamics(
+            self.body,
+            -1,
+            mass=mass,
+            localInertiaDiagonal=(across, across, mass * self._radius**2 / 2),
+            lateralFriction=friction,
+            rollingFriction=rolling_friction,
+            restitution=restitution,
+            physicsClientId=self._client,
+        )
+
+    def reset(self) -> None:
+        """Stand the cylinder at its start, at rest."""
+        pybullet.resetBasePositionAndOrientation(
+            self.body, self._start, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+        )
+        pybullet.resetBaseVelocity(self.body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self._client)
+
+    def pose(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+        """Position in m and orientation as a quaternion (x, y, z, w)."""
+        return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)

@@ -1,0 +1,1 @@
+"""Objectives and bad conditions, as functions of what was observed."""
