@@ -5,6 +5,7 @@ import json
 import os
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -49,14 +50,14 @@ class MotionLedger:
         ends = [Measurement(**entry["measurement"]) for entry in entries if entry["event"] == ENDED]
         return Motion(any(entry["event"] == STARTED for entry in entries), ends[-1] if ends else None)
 
-    def entries(self) -> list[dict[str, object]]:
+    def entries(self) -> list[dict[str, Any]]:
         """Every complete line, oldest first."""
         if not self.path.exists():
             return []
         # A crash can leave half a line, even one that a later append closed with a newline.
         return [entry for line in self.path.read_bytes().split(b"\n") if (entry := _parsed(line)) is not None]
 
-    def _append(self, entry: dict[str, object]) -> None:
+    def _append(self, entry: dict[str, Any]) -> None:
         line = json.dumps(entry, sort_keys=True, allow_nan=False).encode() + b"\n"
         is_new = not self.path.exists()
         with self.path.open("ab+") as file:
@@ -71,7 +72,7 @@ class MotionLedger:
             _sync_folder(self.path.parent)
 
 
-def _parsed(line: bytes) -> dict[str, object] | None:
+def _parsed(line: bytes) -> dict[str, Any] | None:
     try:
         entry = json.loads(line)
     except ValueError:

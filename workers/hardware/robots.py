@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 
@@ -44,8 +43,4 @@ def find(name: str) -> Robot:
     Raises:
         LookupError: when there is none; the message names the nearest.
     """
-    if name not in ROBOTS:
-        close = get_close_matches(name, ROBOTS, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(sorted(ROBOTS))}"
-        raise LookupError(f"unknown robot {name!r}; {hint}")
-    return ROBOTS[name]
+    return ROBOTS[setups.known(name, "robot", ROBOTS)]
