@@ -1,0 +1,98 @@
+"""What a kernel compares instead of controllers: latent paths, compressed where the controller is bad."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+Tau = Float[Tensor, "n k"]
+Y = Float[Tensor, " n"]
+LatentMeans = Callable[[Float[Tensor, "n D"]], tuple[Tensor, Tensor]]
+Embedding = Callable[[Tau, Y], Tau]
+
+_LEAST_SCALE = 0.1
+"""A latent dimension is collapsed below this share of the widest one (SPEC: active dimensions); whitening
+may not blow such noise up to the size of a signal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Latents:
+    """What the frozen model says about a pool of controllers, computed once, and about any other.
+
+    Attributes:
+        tau: Latent paths E[tau | x] of the pool, flattened.
+        y: Predicted badness of the pool, in [0, 1].
+        at: The model's `latent_means`: the same two for other controllers (float32, [n, D]).
+    """
+
+    tau: Float[Tensor, "n k"]
+    y: Float[Tensor, " n"]
+    at: LatentMeans
+
+    def __post_init__(self) -> None:
+        """Refuses latents that would silently make every kernel value NaN or compress the wrong way."""
+        if not torch.isfinite(self.tau).all():
+            raise ValueError("tau must be finite, got NaN or infinity: the model has diverged, train it anew")
+        if not ((self.y >= 0) & (self.y <= 1)).all():
+            raise ValueError(f"y must lie in [0, 1], got {self.y.min():.3g} to {self.y.max():.3g}")
+
+    @classmethod
+    def of(cls, pool: Float[Tensor, "n D"], at: LatentMeans) -> "Latents":
+        """The latents of a pool: the one time the network sees it."""
+        tau, y = _frozen(at, pool)
+        return cls(tau, y, at)
+
+    def means(self, x: Float[Tensor, "n D"]) -> tuple[Float[Tensor, "n k"], Float[Tensor, " n"]]:
+        """E[tau | x] and the predicted badness of any controllers, in float64, without gradients."""
+        return _frozen(self.at, x)
+
+
+def _frozen(at: LatentMeans, x: Float[Tensor, "n D"]) -> tuple[Tensor, Tensor]:
+    with torch.no_grad():
+        tau, y = at(x.float())
+    # The mean of p(y|psi) may overshoot [0, 1], and a negative 1 - y would mirror latent paths.
+    return tau.double(), y.double().clamp(0, 1)
+
+
+def svae(tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:  # noqa: ARG001
+    r"""phi(x) = \bar\tau_x: the latent path as it is, whatever its badness."""
+    return tau
+
+
+def svae_dc(tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:
+    r"""phi(x) = (1 - \bar y_x) \bar\tau_x: dynamic compression, equation (k_svae_dc_dist)."""
+    return (1 - y)[:, None] * tau
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    r"""phi(x) = g(\bar y_x) \bar\tau_x / s: our variant of dynamic compression.
+
+    s holds the standard deviation of each latent dimension over simulated controllers, and g rescales the
+    goodness 1 - \bar y so that the worst of them has 0 and the best 1. The latent path is not centred, so
+    that bad controllers meet in the origin, as in the paper, and not at the mean controller.
+
+    Attributes:
+        s: Scale of each latent dimension.
+        worst: Largest predicted badness, where g is 0.
+        best: Smallest predicted badness, where g is 1.
+    """
+
+    s: Float[Tensor, " k"]
+    worst: float
+    best: float
+
+    @classmethod
+    def over(cls, tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> "Whitened":
+        """The statistics of simulated controllers, at least two."""
+        spread = tau.std(dim=0)
+        s = spread.clamp_min(max(_LEAST_SCALE * float(spread.max()), torch.finfo(tau.dtype).tiny))
+        return cls(s, worst=float(y.max()), best=float(y.min()))
+
+    def __call__(self, tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:
+        """The features of any controllers; beyond the worst and the best simulated one, g stays 0 and 1."""
+        range_of_y = max(self.worst - self.best, torch.finfo(tau.dtype).tiny)
+        g = ((self.worst - y) / range_of_y).clamp(0, 1)
+        return g[:, None] * tau / self.s
