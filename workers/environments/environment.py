@@ -59,7 +59,11 @@ class Environment(ABC):
 
     @abstractmethod
     def step(self, command: Sequence[float]) -> Any:
-        """Apply one command, advance one control step, and return a raw record of what is seen then."""
+        """Apply one command, advance one control step, and return the raw record of what is seen then."""
+
+    @abstractmethod
+    def record(self) -> Any:
+        """The raw record of what is seen now; raw, because converting whole episodes at once is cheaper."""
 
     @abstractmethod
     def observed(self, records: Sequence[Any]) -> Observed:

@@ -107,12 +107,15 @@ class Tabletop(Environment):
 
     def step(self, command: Sequence[float]) -> Record:
         """Apply joint torques for one control step."""
-        arm, world = self.arm, self._world
-        arm.apply_torque(command)
-        world.step()
-        state = arm.refresh()
+        self.arm.apply_torque(command)
+        self._world.step()
+        return self.record()
+
+    def record(self) -> Record:
+        """Joint angles, position of the hand, contact with the table, pose of every object."""
+        state = self.arm.refresh()
         poses = tuple([cylinder.pose() for cylinder in self._cylinders])
-        return state.joints, state.position, arm.touches(world.plane), poses
+        return state.joints, state.position, self.arm.touches(self._world.plane), poses
 
     def observed(self, records: Sequence[Record]) -> Observed:
         """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T]."""

@@ -1,0 +1,62 @@
+"""Collecting one shard: the whole of a rollout worker's job."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from workers.dataset import schema, shards
+from workers.dataset.folder import Dataset
+from workers.dataset.shards import Shard
+from workers.rollout import DIVERGED, random_episode
+from workers.setups import Setup
+
+
+@dataclass(frozen=True)
+class ShardReport:
+    """What one shard was and cost.
+
+    Attributes:
+        shard: the range of episodes.
+        badness: mean y.
+        diverged: episodes whose simulation exploded.
+        best: highest f.
+        size: bytes on disk.
+        rollout_seconds: CPU time of this process in rollouts.
+        storage_seconds: CPU time in encoding, hashing and writing.
+    """
+
+    shard: Shard
+    badness: float
+    diverged: int
+    best: float
+    size: int
+    rollout_seconds: float
+    storage_seconds: float
+
+
+def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:
+    """Roll out the episodes of a shard in a fresh simulation and commit its file.
+
+    Raises:
+        OSError: when the disk is full or not writable; nothing is left behind.
+    """
+    begin = time.process_time()
+    with setup.open() as environment:
+        episodes = [
+            random_episode(setup, environment, dataset.identity.seed, index)
+            for index in range(shard.start, shard.stop)
+        ]
+    rolled_out = time.process_time()
+    path = shards.commit(
+        dataset.folder, shard, lambda target: schema.write(target, dataset.identity, shard.start, episodes)
+    )
+    return ShardReport(
+        shard=shard,
+        badness=float(np.mean([episode.y for episode in episodes])),
+        diverged=sum(episode.stop == DIVERGED for episode in episodes),
+        best=max(episode.f for episode in episodes),
+        size=path.stat().st_size,
+        rollout_seconds=rolled_out - begin,
+        storage_seconds=time.process_time() - rolled_out,
+    )

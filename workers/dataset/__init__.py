@@ -1,0 +1,1 @@
+"""The dataset contract: Parquet shards that are pure functions of an identity and an episode range."""

@@ -1,0 +1,139 @@
+"""The training cache: a dataset decoded once into memory-mapped arrays at the stride the model is trained with."""
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, Int64
+
+from workers.dataset import shards
+from workers.dataset.folder import Dataset
+from workers.dataset.schema import Columns
+
+_READY = "cache.json"
+_ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
+
+
+@dataclass(frozen=True)
+class TrainingCache:
+    """Memory-mapped arrays of N episodes and S = T // stride samples; diverged episodes are left out.
+
+    Attributes:
+        episode: indices.
+        x: controllers in [0,1]^D.
+        xi: trajectories in the units of the setup's channels, the last step of every stride.
+        bad: 1 where a bad condition held at the sampled step, else 0.
+        y: badness over all T steps.
+        f: objective.
+    """
+
+    episode: Int64[np.ndarray, " n"]
+    x: Float32[np.ndarray, "n d"]
+    xi: Float32[np.ndarray, "n obs samples"]
+    bad: Float32[np.ndarray, "n samples"]
+    y: Float32[np.ndarray, " n"]
+    f: Float32[np.ndarray, " n"]
+
+    def held_out(self) -> np.ndarray:
+        """Rows kept from training: every tenth episode by its index, the same ones however far the data grows."""
+        return np.flatnonzero(np.asarray(self.episode) % 10 == 9)
+
+    def training(self) -> np.ndarray:
+        """Rows to train on."""
+        return np.flatnonzero(np.asarray(self.episode) % 10 != 9)
+
+
+def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache:
+    """Open the cache of a dataset at a stride below `parent`, decoding the dataset first if it must.
+
+    Raises:
+        ValueError: when the stride does not fit the horizon, the dataset is empty, or a shard is damaged.
+        OSError: when the disk is too small; the error names both sizes.
+    """
+    if not 1 <= stride <= dataset.identity.horizon:
+        raise ValueError(f"stride must lie between 1 and the horizon {dataset.identity.horizon}, got {stride}")
+    folder = parent / f"{dataset.fingerprint()[:16]}-stride{stride}"
+    if not (folder / _READY).exists():
+        _build(dataset, stride, folder)
+    arrays = {name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in _ARRAYS}
+    return TrainingCache(**arrays)
+
+
+def _build(dataset: Dataset, stride: int, folder: Path) -> None:
+    count = dataset.episodes()
+    if count == 0:
+        raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
+    building = folder.with_name(f"{folder.name}.{shards.writer()}")
+    building.mkdir(parents=True, exist_ok=True)
+    try:
+        _check_space(dataset, stride, count, building)
+        kept = _decode(dataset, stride, count, building)
+        (building / _READY).write_text(json.dumps({"episodes": kept, "stride": stride}) + "\n")
+        _move_into_place(building, folder)
+    finally:
+        shutil.rmtree(building, ignore_errors=True)
+
+
+def _move_into_place(building: Path, folder: Path) -> None:
+    """First writer wins: another process may have decoded the same dataset meanwhile."""
+    try:
+        building.rename(folder)
+    except OSError:
+        if not (folder / _READY).exists():
+            raise
+
+
+def _check_space(dataset: Dataset, stride: int, count: int, folder: Path) -> None:
+    identity = dataset.identity
+    samples = identity.horizon // stride
+    needed = 4 * count * (len(identity.parameters) + (len(identity.observation) + 1) * samples + 4)
+    free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise OSError(
+            f"the training cache needs {needed / 1e9:.1f} GB below {folder.parent}, only {free / 1e9:.1f} GB are free; "
+            "free some, choose another folder (train.cache), or a larger stride (train.stride)"
+        )
+
+
+def _decode(dataset: Dataset, stride: int, count: int, folder: Path) -> int:
+    identity = dataset.identity
+    samples = identity.horizon // stride
+    shapes = {
+        "episode": (np.int64, (count,)),
+        "x": (np.float32, (count, len(identity.parameters))),
+        "xi": (np.float32, (count, len(identity.observation), samples)),
+        "bad": (np.float32, (count, samples)),
+        "y": (np.float32, (count,)),
+        "f": (np.float32, (count,)),
+    }
+    arrays = {
+        name: np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=kind, shape=shape)
+        for name, (kind, shape) in shapes.items()
+    }
+    filled = 0
+    for _, columns in dataset.batches():
+        rows = _sampled(columns, stride, samples)
+        size = len(rows["episode"])
+        for name, values in rows.items():
+            arrays[name][filled : filled + size] = values
+        filled += size
+    for name, array in arrays.items():
+        array.flush()
+        if filled < count:
+            np.save(folder / f"{name}.npy", array[:filled].copy())
+    return filled
+
+
+def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
+    sane = np.array([stop != "diverged" for stop in columns.stop])
+    last = slice(stride - 1, samples * stride, stride)
+    return {
+        "episode": columns.episode[sane],
+        "x": columns.x[sane],
+        "xi": columns.xi[sane][:, :, last],
+        "bad": (columns.bad[sane][:, last] != 0).astype(np.float32),
+        "y": columns.y[sane],
+        "f": columns.f[sane],
+    }

@@ -1,0 +1,101 @@
+"""What a dataset is: everything that decides the bytes of its episodes."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import version
+from typing import Any, Self
+
+from workers.rollout import VERSION as ROLLOUT_VERSION
+from workers.setups import Setup
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Two datasets with equal identities hold equal episodes; unequal ones never mix.
+
+    Attributes:
+        setup: its name.
+        parameters: name, low and high of every controller parameter.
+        observation: name, unit, low and high of every channel of ξ.
+        conditions: names of the bad conditions.
+        horizon: T, control steps.
+        control_step: s.
+        physics: the interval of every randomised parameter.
+        seed: of all controllers and physics.
+        episodes_per_shard: how the episodes are cut into files.
+        schema_version: of the Parquet columns.
+        rollout_version: of the simulation's code.
+        pybullet: version.
+        numpy: version.
+    """
+
+    setup: str
+    parameters: tuple[tuple[str, float, float], ...]
+    observation: tuple[tuple[str, str, float, float], ...]
+    conditions: tuple[str, ...]
+    horizon: int
+    control_step: float
+    physics: Mapping[str, tuple[float, float]]
+    seed: int
+    episodes_per_shard: int
+    schema_version: int
+    rollout_version: int
+    pybullet: str
+    numpy: str
+
+    def __post_init__(self) -> None:
+        """Refuse shards without episodes."""
+        if self.episodes_per_shard < 1:
+            raise ValueError(f"episodes_per_shard must be at least 1, got {self.episodes_per_shard}")
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the identity in canonical JSON."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """Canonical JSON: sorted keys, no spaces."""
+        return json.dumps(asdict(self), sort_keys=True, separators=(",", ":"))
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The identity that `to_json` wrote."""
+        values: dict[str, Any] = json.loads(text)
+        for name in ("parameters", "observation"):
+            values[name] = tuple(tuple(row) for row in values[name])
+        values["conditions"] = tuple(values["conditions"])
+        values["physics"] = {name: tuple(interval) for name, interval in values["physics"].items()}
+        return cls(**values)
+
+    def differences(self, other: "Identity") -> tuple[str, ...]:
+        """One line for every field in which two identities differ."""
+        pairs = ((field.name, getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
+        return tuple(f"{name}: {_brief(mine)} and {_brief(theirs)}" for name, mine, theirs in pairs if mine != theirs)
+
+
+def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int) -> Identity:
+    """The identity of a dataset collected now, with this code and these libraries."""
+    return Identity(
+        setup=setup.name,
+        parameters=tuple((p.name, p.low, p.high) for p in setup.controller.parameters),
+        observation=tuple((c.name, c.unit, c.low, c.high) for c in setup.observation),
+        conditions=setup.conditions,
+        horizon=setup.horizon,
+        control_step=setup.control_step,
+        physics=dict(setup.physics.intervals),
+        seed=seed,
+        episodes_per_shard=episodes_per_shard,
+        schema_version=SCHEMA_VERSION,
+        rollout_version=ROLLOUT_VERSION,
+        pybullet=version("pybullet"),
+        numpy=version("numpy"),
+    )
+
+
+def _brief(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 80 else text[:77] + "..."
