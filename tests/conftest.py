@@ -1,6 +1,7 @@
 """Fixtures shared by all tests; they import the packages inside, after the run-time type checker is in place."""
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,11 @@ def tracking_settings(tmp_path: Path):
     from cluster.config import TrackingSettings
 
     return TrackingSettings(uri=f"sqlite:///{tmp_path}/store/mlflow.db", experiment="tests")
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A TCP port on loopback that nothing serves just now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]

@@ -1,0 +1,86 @@
+"""The store behind the runs: a SQLite file, created safely, or an MLflow server."""
+
+import fcntl
+import logging
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import SplitResult, urlsplit
+
+from mlflow import MlflowClient
+from mlflow.entities import LifecycleStage
+from mlflow.exceptions import MlflowException
+from sqlalchemy.exc import SQLAlchemyError
+
+from cluster.config import TrackingSettings
+from cluster.errors import UserError
+from cluster.tracking.runs import Tracker, unusable
+
+SQLITE = "sqlite:///"
+CONNECT_SECONDS = 5.0
+"""A server that accepts no connection within this is unreachable; MLflow itself would retry for minutes."""
+
+
+def open_tracker(settings: TrackingSettings) -> Tracker:
+    """Opens the store, creating its folder, tables and experiment where they are absent.
+
+    Call it before anything else starts: processes that create the same SQLite tables at once break them, and
+    only among commands of one machine does the lock on the folder prevent that.
+
+    Raises:
+        UserError: the store cannot be created, reached or written.
+    """
+    logging.getLogger("mlflow").setLevel(logging.WARNING)
+    logging.getLogger("alembic").setLevel(logging.WARNING)
+    uri = settings.uri
+    try:
+        if not uri.startswith(SQLITE):
+            _knock(urlsplit(uri))
+            client = MlflowClient(uri)
+            return Tracker(client, uri, _experiment(client, settings.experiment, artifacts=None))
+        database = Path(uri.removeprefix(SQLITE)).expanduser().absolute()
+        uri = f"{SQLITE}{database}"
+        with _alone(database):
+            client = MlflowClient(uri)
+            artifacts = (database.parent / "mlruns").as_uri()
+            return Tracker(client, uri, _experiment(client, settings.experiment, artifacts))
+    except (MlflowException, SQLAlchemyError, OSError) as error:
+        raise unusable(uri, error) from error
+
+
+def _experiment(client: MlflowClient, name: str, artifacts: str | None) -> str:
+    """The experiment's id; another command may create it between our look and our try."""
+    found = client.get_experiment_by_name(name)
+    if found is None:
+        try:
+            return str(client.create_experiment(name, artifact_location=artifacts))
+        except MlflowException as error:
+            found = client.get_experiment_by_name(name)
+            if found is None:
+                raise error
+    if found.lifecycle_stage == LifecycleStage.DELETED:
+        raise UserError(
+            f"the MLflow experiment {name!r} was deleted; restore it or --set tracking.experiment=NAME"
+        )
+    return str(found.experiment_id)
+
+
+@contextmanager
+def _alone(database: Path) -> Iterator[None]:
+    """Holds a lock on the database's folder, creating it first; the kernel frees it when the process dies."""
+    database.parent.mkdir(parents=True, exist_ok=True)
+    folder = os.open(database.parent, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
+def _knock(address: SplitResult) -> None:
+    """Tries one connection to a tracking server; other kinds of store report for themselves."""
+    if address.scheme in {"http", "https"}:
+        port = address.port or {"http": 80, "https": 443}[address.scheme]
+        socket.create_connection((address.hostname or "", port), timeout=CONNECT_SECONDS).close()
