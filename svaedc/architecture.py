@@ -1,0 +1,149 @@
+"""Sizes and choices of the SVAE-DC networks, as one value that validates itself."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+KERNEL: Final = 4
+"""Width of every convolution (paper, section 5)."""
+
+STRIDE: Final = 2
+"""Stride of every convolution (paper, section 5)."""
+
+_CHOICES: Final = {
+    "distribution": ("laplace", "gaussian"),
+    "head": ("low-rank", "dense"),
+    "prior": ("mlp", "deconv"),
+}
+_SIZES: Final = (
+    "controller_dim",
+    "observation_dim",
+    "time_steps",
+    "path_length",
+    "tau_dim",
+    "psi_dim",
+    "rank",
+)
+
+
+@dataclass(frozen=True)
+class ScaleBounds:
+    """Smooth lower and upper end of a predicted scale, in the unit of what it scales."""
+
+    floor: float
+    cap: float
+
+    def __post_init__(self) -> None:
+        """Refuse an empty, negative or infinite range."""
+        if not 0.0 < self.floor < self.cap < math.inf:
+            raise ValueError(f"scale bounds must satisfy 0 < floor < cap, got {self.floor} and {self.cap}")
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Everything that determines the shapes of an `SvaeDc`.
+
+    Attributes:
+        controller_dim: D, dimensions of x.
+        observation_dim: Channels of a trajectory.
+        time_steps: Steps S of a (strided) trajectory.
+        path_length: K, steps of the latent path.
+        tau_dim: Dimensions of tau at each step of the path.
+        psi_dim: Dimensions of psi at each step of the path.
+        distribution: Family of all four networks, `laplace` (the paper) or `gaussian`.
+        head: Output of p(xi|tau): `dense` (the paper) or `low-rank` (ours).
+        prior: p(tau, psi|x): `deconv` (the paper) or `mlp` (ours).
+        channels: Convolution channels of q, reversed in p(xi|tau).
+        rank: Coefficients of the low-rank head.
+        prior_hidden: Channels (`deconv`) or hidden units (`mlp`) of p(tau, psi|x).
+        badness_hidden: Hidden units of p(y|psi).
+        latent_scale: Bounds of the latent scales.
+        observation_scale: Bounds of the scales of xi: in units of the mean absolute residual of each
+            dimension for `low-rank`, of the observation range for `dense`.
+        badness_scale: Bounds of the scale of y.
+    """
+
+    controller_dim: int
+    observation_dim: int
+    time_steps: int
+    path_length: int = 3
+    tau_dim: int = 3
+    psi_dim: int = 1
+    distribution: str = "laplace"
+    head: str = "low-rank"
+    prior: str = "mlp"
+    channels: tuple[int, ...] = (32, 64, 128)
+    rank: int = 80
+    prior_hidden: tuple[int, ...] = (384, 384, 384)
+    badness_hidden: tuple[int, ...] = (64, 64)
+    latent_scale: ScaleBounds = ScaleBounds(1e-3, 10.0)
+    observation_scale: ScaleBounds = ScaleBounds(0.1, 10.0)
+    badness_scale: ScaleBounds = ScaleBounds(1e-2, 1.0)
+
+    def __post_init__(self) -> None:
+        """Refuse unknown choices and sizes no network can be built from."""
+        for name, allowed in _CHOICES.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        for name in _SIZES:
+            _require_positive(name, [getattr(self, name)])
+        for name in ("channels", "prior_hidden", "badness_hidden"):
+            _require_positive(name, getattr(self, name))
+        if encoded_length(self.time_steps, len(self.channels)) < 1:
+            raise ValueError(
+                f"time_steps must be long enough for {len(self.channels)} convolutions of width {KERNEL} and "
+                f"stride {STRIDE}, got {self.time_steps}; lower the training stride"
+            )
+
+    @property
+    def tau_size(self) -> int:
+        """Elements of the flattened latent path tau."""
+        return self.path_length * self.tau_dim
+
+    @property
+    def psi_size(self) -> int:
+        """Elements of the flattened psi."""
+        return self.path_length * self.psi_dim
+
+    @property
+    def latent_size(self) -> int:
+        """Elements of the latent code [tau, psi]."""
+        return self.tau_size + self.psi_size
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain built-in values, for checkpoints and logs."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> "ModelConfig":
+        """Inverse of `to_dict`.
+
+        Raises:
+            ValueError: A value is refused, or a name is unknown or missing.
+        """
+        tuples = {name: tuple(value) for name, value in values.items() if isinstance(value, list | tuple)}
+        bounds = {name: ScaleBounds(**value) for name, value in values.items() if isinstance(value, dict)}
+        try:
+            return cls(**{**values, **tuples, **bounds})
+        except TypeError as error:
+            raise ValueError(f"not a model configuration of this version: {error}") from error
+
+
+def encoded_length(steps: int, layers: int) -> int:
+    """Length of a sequence after `layers` convolutions without padding; below 1 when it is too short."""
+    for _ in range(layers):
+        steps = (steps - KERNEL) // STRIDE + 1
+    return steps
+
+
+def decoded_length(steps: int, layers: int) -> int:
+    """Length of a sequence after `layers` transposed convolutions."""
+    for _ in range(layers):
+        steps = (steps - 1) * STRIDE + KERNEL
+    return steps
+
+
+def _require_positive(name: str, values: Sequence[int]) -> None:
+    if not values or min(values) < 1:
+        raise ValueError(f"{name} must be at least 1 everywhere, got {values}")

@@ -1,0 +1,115 @@
+"""What a trained model has learnt, measured on held-out episodes, and whether it has collapsed."""
+
+from typing import Final
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from svaedc.episodes import Batch, Episodes
+from svaedc.model import SvaeDc
+
+BATCH: Final = 256
+ACTIVE_SHARE_OF_SPREAD: Final = 0.1
+"""Active: E[tau_d|x] spreads over controllers by at least this share of the aggregate posterior."""
+
+REMEDIES: Final = {
+    "active_share": "lower the KL weight, lengthen its warm-up, or train longer",
+    "corr_y_rec": "use the `balanced` weighting, which raises the weight of y",
+    "rec_norm": "raise the learning rate or train longer",
+    "gen_norm": "collect more episodes, or train the prior longer",
+}
+
+
+@torch.no_grad()
+def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
+    """Named measures of a model on held-out episodes, in evaluation mode.
+
+    `rec` decodes the mean of q(tau|xi, y), `gen` the mean of p(tau|x). Errors are relative to predicting the
+    per-step median of the training data: `norm` is the mean over dimensions of that ratio, `raw` the ratio of
+    the means over all elements in parts of the observation range; 1 is no better than the median. Dimensions
+    that never leave their median are left out. A correlation is NaN when the true y does not vary and 0 when
+    the predicted y does not.
+
+    Returns:
+        `rec_norm`, `rec_raw`, `gen_norm`, `gen_raw`, `corr_y_rec`, `corr_y_gen`, `active_dimensions`,
+        `active_share` and the unweighted `elbo`, `log_p_xi`, `log_p_y`, `kl` per episode.
+
+    Raises:
+        ValueError: Fewer than two episodes: nothing varies.
+    """
+    if len(episodes) < 2:
+        raise ValueError(f"diagnostics need at least 2 held-out episodes, got {len(episodes)}; collect more")
+    device = model.normaliser.low.device
+    positions = np.arange(len(episodes))
+    was_training = model.training
+    model.eval()
+    # A fixed seed makes the draw of q the same in every evaluation and leaves the caller's generator alone.
+    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
+        torch.manual_seed(0)
+        parts = [
+            _measured(model, episodes.gather(positions[start : start + BATCH], device))
+            for start in range(0, len(positions), BATCH)
+        ]
+    model.train(was_training)
+    return _summary({name: torch.cat([part[name] for part in parts]).cpu().double() for name in parts[0]})
+
+
+def collapse(metrics: dict[str, float]) -> str | None:
+    """Why a model must not be used, with a remedy, or None when it has learnt something of everything."""
+    too_little = {"active_share": 1 / 3, "corr_y_rec": 0.5}
+    too_much = {"rec_norm": 0.95, "gen_norm": 0.98}
+    collapsed = [name for name, least in too_little.items() if metrics[name] < least]
+    collapsed += [name for name, most in too_much.items() if metrics[name] > most]
+    if not collapsed:
+        return None
+    name = collapsed[0]
+    return f"the model collapsed: {name} is {metrics[name]:.2f}; {REMEDIES[name]}"
+
+
+def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *rest"]]:
+    """Per-episode quantities that the summary averages."""
+    terms = model(*batch)
+    q, p = model.posterior(batch.xi, batch.bad, batch.y), model.prior(batch.x)
+    (q_tau, q_psi), (p_tau, p_psi) = model.split(q.loc), model.split(p.loc)
+    xi = model.normaliser.scaled(batch.xi)
+    return {
+        "median_error": (model.normaliser.median - xi).abs().mean(-1),
+        "rec_error": (model.p_xi(q_tau).loc - xi).abs().mean(-1),
+        "gen_error": (model.p_xi(p_tau).loc - xi).abs().mean(-1),
+        "y": batch.y,
+        "y_rec": model.p_y(q_psi).loc,
+        "y_gen": model.p_y(p_psi).loc,
+        "q_tau": q_tau,
+        "q_tau_variance": model.split(q.variance)[0],
+        "p_tau": p_tau,
+        **terms._asdict(),
+    }
+
+
+def _summary(measured: dict[str, Tensor]) -> dict[str, float]:
+    error = {name: measured[f"{name}_error"].mean(0) for name in ("median", "rec", "gen")}
+    moving = error["median"] > 0.0
+    aggregate_std = (measured["q_tau"].var(0) + measured["q_tau_variance"].mean(0)).sqrt()
+    active = measured["p_tau"].std(0) >= ACTIVE_SHARE_OF_SPREAD * aggregate_std
+    summary = {
+        "active_dimensions": active.double().sum(),
+        "active_share": active.double().mean(),
+        **{name: measured[name].mean() for name in ("log_p_xi", "log_p_y", "kl")},
+    }
+    for name in ("rec", "gen"):
+        summary[f"{name}_norm"] = (error[name] / error["median"])[moving].mean()
+        summary[f"{name}_raw"] = error[name].mean() / error["median"].mean()
+        summary[f"corr_y_{name}"] = _correlation(measured["y"], measured[f"y_{name}"])
+    summary["elbo"] = summary["log_p_xi"] + summary["log_p_y"] - summary["kl"]
+    return {name: float(value) for name, value in summary.items()}
+
+
+def _correlation(truth: Float[Tensor, " n"], prediction: Float[Tensor, " n"]) -> Tensor:
+    if truth.std() == 0.0:
+        return torch.tensor(torch.nan)
+    # Below this spread a prediction is constant up to rounding.
+    if prediction.std() < 1e-6:
+        return torch.tensor(0.0)
+    return torch.corrcoef(torch.stack([truth, prediction]))[0, 1]

@@ -1,0 +1,92 @@
+"""Rows of a training cache as the model sees them, gathered in batches from arrays or memory maps."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
+
+import numpy as np
+import torch
+from jaxtyping import Float, Float32, Integer
+from torch import Tensor
+
+
+class Batch(NamedTuple):
+    """A few episodes as tensors; `xi` is channel-major and in SI units."""
+
+    x: Float[Tensor, "batch controller"]
+    xi: Float[Tensor, "batch obs time"]
+    bad: Float[Tensor, "batch time"]
+    y: Float[Tensor, " batch"]
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """Selected rows of equally long arrays; nothing is copied until a batch is gathered.
+
+    Attributes:
+        x: Controllers in the unit cube.
+        xi: Trajectories, channel-major, SI units, at the training stride.
+        bad: 1 where any bad condition fired at a sampled step, else 0.
+        y: Badness over all steps, in [0, 1].
+        rows: Rows of the arrays that belong to this selection.
+    """
+
+    x: Float32[np.ndarray, "all controller"]
+    xi: Float32[np.ndarray, "all obs time"]
+    bad: Float32[np.ndarray, "all time"]
+    y: Float32[np.ndarray, " all"]
+    rows: Integer[np.ndarray, " episodes"]
+
+    def __post_init__(self) -> None:
+        """Refuse arrays of different lengths and rows outside them."""
+        lengths = {name: len(getattr(self, name)) for name in ("x", "xi", "bad", "y")}
+        if len(set(lengths.values())) != 1:
+            raise ValueError(
+                f"the arrays of one cache must be equally long, got {lengths}; rebuild the cache"
+            )
+        if len(self.rows) and not 0 <= self.rows.min() <= self.rows.max() < len(self.x):
+            raise ValueError(
+                f"rows must lie in 0..{len(self.x) - 1}, got {self.rows.min()}..{self.rows.max()}"
+            )
+
+    def __len__(self) -> int:
+        """Episodes in the selection."""
+        return len(self.rows)
+
+    def require_sizes(self, controller_dim: int, observation_dim: int, time_steps: int) -> None:
+        """Raise ValueError unless the arrays have these sizes."""
+        expected = ((controller_dim,), (observation_dim, time_steps))
+        found = (self.x.shape[1:], self.xi.shape[1:])
+        if found != expected:
+            raise ValueError(
+                f"this model takes x {expected[0]} and xi [obs, time] {expected[1]}, "
+                f"got {found[0]} and {found[1]}; check the setup and the training stride"
+            )
+
+    def gather(self, positions: Integer[np.ndarray, " batch"], device: torch.device) -> Batch:
+        """Episodes at `positions` of the selection, in storage order: a memory map is read forwards."""
+        rows = self.rows[np.sort(positions)]
+        columns = (torch.from_numpy(np.asarray(array[rows])) for array in (self.x, self.xi, self.bad, self.y))
+        return Batch(*(column.to(device) for column in columns))
+
+    def sample(self, count: int, rng: np.random.Generator) -> Self:
+        """At most `count` of the episodes, drawn without replacement, in storage order."""
+        return replace(self, rows=self.rows[np.sort(rng.permutation(len(self))[:count])])
+
+
+def split(episodes: Episodes, episode: Integer[np.ndarray, " episodes"]) -> tuple[Episodes, Episodes]:
+    """Training and held-out episodes: one in ten, those whose number ends in 9, is held out.
+
+    Args:
+        episodes: The selection to split.
+        episode: The dataset-wide number of each, so that extending a dataset moves no episode across.
+
+    Raises:
+        ValueError: The numbers do not fit the selection.
+    """
+    if len(episode) != len(episodes):
+        raise ValueError(f"{len(episodes)} episodes need as many numbers, got {len(episode)}")
+    is_held_out = episode % 10 == 9
+    return (
+        replace(episodes, rows=episodes.rows[~is_held_out]),
+        replace(episodes, rows=episodes.rows[is_held_out]),
+    )

@@ -1,0 +1,145 @@
+"""How a model is trained: budgets, optimisers and the weights of the bound."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import torch
+from torch import nn
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """Weights of the bound's terms during training; the unweighted bound is always reported too.
+
+    Attributes:
+        kl: Weight of the KL term; 1 is the paper's equation.
+        y: Weight of log p(y|psi); 1 is the paper's equation.
+        warm_up: Share of the joint stage over which the KL weight rises linearly from 0.
+    """
+
+    kl: float
+    y: float
+    warm_up: float
+
+    def __post_init__(self) -> None:
+        """Refuse weights that leave nothing to maximise."""
+        if not (0.0 <= self.kl < math.inf and 0.0 <= self.y < math.inf):
+            raise ValueError(f"weights must be finite and at least 0, got kl={self.kl} and y={self.y}")
+        if not 0.0 <= self.warm_up <= 1.0:
+            raise ValueError(f"warm_up is a share of the updates in [0, 1], got {self.warm_up}")
+
+    def kl_at(self, progress: float) -> float:
+        """KL weight after `progress`, the share of the joint stage that is done."""
+        return self.kl * min(1.0, progress / self.warm_up) if self.warm_up else self.kl
+
+
+WEIGHTINGS: Final = {
+    "paper": Weighting(kl=1.0, y=1.0, warm_up=0.1),
+    "balanced": Weighting(kl=1.0, y=100.0, warm_up=0.3),
+}
+"""`paper`: the paper's equation. `balanced`: keeps psi alive, where y drowns in the elements of xi."""
+
+
+@dataclass(frozen=True)
+class StageSettings:
+    """One stage of training.
+
+    Attributes:
+        updates: Gradient updates; 0 leaves the stage out.
+        optimiser: `adam` (decoupled weight decay) or `rmsprop` (alpha 0.99).
+        schedule: `cosine` decay to 0 at the stage's end, or `halving` every 5,000 updates down to 1e-5
+            (section 5).
+        learning_rate: Of the first update.
+        weight_decay: Of the optimiser.
+        dropout: Between the hidden layers of p(tau, psi|x).
+        gradient_norm: Gradients are scaled down to at most this norm.
+    """
+
+    updates: int
+    optimiser: str
+    schedule: str
+    learning_rate: float
+    weight_decay: float
+    dropout: float
+    gradient_norm: float
+
+    def __post_init__(self) -> None:
+        """Refuse unknown names and values outside their ranges."""
+        for name, allowed in (("optimiser", OPTIMISERS), ("schedule", SCHEDULES)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        if self.updates < 0 or self.learning_rate <= 0.0 or self.weight_decay < 0.0:
+            raise ValueError(
+                "updates and weight_decay must be at least 0 and learning_rate above it, got "
+                f"{self.updates}, {self.weight_decay} and {self.learning_rate}"
+            )
+        if not (0.0 <= self.dropout < 1.0 and self.gradient_norm > 0.0):
+            raise ValueError(
+                "dropout must be in [0, 1) and gradient_norm above 0, got "
+                f"{self.dropout} and {self.gradient_norm}"
+            )
+
+    def learning_rate_at(self, update: int) -> float:
+        """Learning rate of update number `update`, counted from 0."""
+        return SCHEDULES[self.schedule](self, update)
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """Everything but data and sizes that determines a training run.
+
+    Attributes:
+        joint: Stage one: the whole bound.
+        prior: Stage two: p(tau, psi|x) alone, refitted on the same KL term.
+        weighting: Weights of stage one.
+        batch_size: Episodes per update, over all workers together.
+        epoch_updates: Updates between two reports (and two checkpoints): an epoch here, whatever the
+            dataset's size.
+        held_out_sample: Held-out episodes that each report is measured on.
+        seed: Determines weights, order of episodes and every random draw.
+    """
+
+    joint: StageSettings
+    prior: StageSettings
+    weighting: Weighting
+    batch_size: int
+    epoch_updates: int = 250
+    held_out_sample: int = 512
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse counts below their minimum."""
+        for name, least in (("batch_size", 1), ("epoch_updates", 1), ("held_out_sample", 2), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain built-in values, for checkpoints and logs."""
+        return asdict(self)
+
+
+def optimiser_of(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
+    """New optimiser over the parameters of `module`."""
+    return OPTIMISERS[settings.optimiser](module, settings)
+
+
+def _adam(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
+    return torch.optim.AdamW(module.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+
+
+def _rmsprop(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
+    decay = settings.weight_decay
+    return torch.optim.RMSprop(module.parameters(), settings.learning_rate, alpha=0.99, weight_decay=decay)
+
+
+def _cosine(settings: StageSettings, update: int) -> float:
+    return settings.learning_rate * 0.5 * (1.0 + math.cos(math.pi * update / settings.updates))
+
+
+def _halving(settings: StageSettings, update: int) -> float:
+    return max(settings.learning_rate * 0.5 ** (update // 5_000), min(1e-5, settings.learning_rate))
+
+
+OPTIMISERS: Final = {"adam": _adam, "rmsprop": _rmsprop}
+SCHEDULES: Final = {"cosine": _cosine, "halving": _halving}
