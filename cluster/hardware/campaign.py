@@ -1,0 +1,170 @@
+"""A hardware campaign: which step comes next, and that each is in the journal before the robot feels it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from cluster.hardware.events import Trial
+from cluster.hardware.journal import Journal
+from cluster.hardware.standing import RANDOM_TRIALS, Standing, standing
+from cluster.hardware.states import TERMINAL, State
+from svaedc.history import History
+from workers.hardware.driver import RobotDriver, RobotFault
+from workers.randomness import generator
+
+Suggest = Callable[[History, np.random.Generator], np.ndarray]
+Predict = Callable[[np.ndarray], float | None]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What the steps of a campaign work with.
+
+    Attributes:
+        journal: the truth about every trial.
+        robot: that is moved.
+        suggest: the method, a pure function of history and generator.
+        predict: badness of a controller in [0, 1] as the model expects it; None without a model.
+        dimensions: D of the robot's setup.
+        process: the host, boot and process id that act, kept as evidence.
+        versions: of the libraries that compute proposals, kept as evidence.
+    """
+
+    journal: Journal
+    robot: RobotDriver
+    suggest: Suggest
+    predict: Predict
+    dimensions: int
+    process: Mapping[str, Any]
+    versions: Mapping[str, str]
+
+
+def advance(campaign: Campaign) -> Standing:
+    """Goes on until one trial has ended, or until only a person can go on.
+
+    Call it from one thread of the one process that holds the campaign's lock: a trial found granted or
+    running here is then one that nobody carries out any more.
+    """
+    recover(campaign)
+    now = _standing(campaign)
+    while now is Standing.READY:
+        trial = _step(campaign)
+        now = _standing(campaign)
+        if trial.state in TERMINAL:
+            break
+    return now
+
+
+def recover(campaign: Campaign) -> None:
+    """Closes what a dead process left behind: `unknown` for a trial that may have moved the robot.
+
+    A trial that was granted and that the robot's own ledger has never seen goes back to approved.
+    """
+    for trial in campaign.journal.trials():
+        if trial.state not in (State.GRANTED, State.RUNNING):
+            continue
+        motion = campaign.robot.motion(trial_id(campaign.journal, trial))
+        never_started = trial.state is State.GRANTED and not motion.started
+        new = State.APPROVED if never_started else State.UNKNOWN
+        record(
+            campaign.journal, trial, new, "recovery", {"ledger": asdict(motion), "found_by": campaign.process}
+        )
+
+
+def history(trials: tuple[Trial, ...], dimensions: int) -> History:
+    """What the method may learn from: measured trials; failed and aborted ones only as tried before."""
+    past = History.empty(dimensions)
+    for trial in trials:
+        if trial.state is State.MEASURED:
+            past = past.append(trial.x, trial.measurement[0])
+        elif trial.state in (State.FAILED, State.ABORTED):
+            past = past.append(trial.x, float("nan"))
+    return past
+
+
+def objection(x: Float[np.ndarray, " n"], dimensions: int) -> str | None:
+    """Why a controller must not reach the robot; None when it may."""
+    if x.shape != (dimensions,):
+        return f"the controller must have {dimensions} parameters, got {x.size}"
+    if not np.isfinite(x).all():
+        return f"every parameter must be finite, got {x[~np.isfinite(x)][0]}"
+    if not ((x >= 0) & (x <= 1)).all():
+        return f"every parameter must lie in [0, 1], got {x[(x < 0) | (x > 1)][0]}"
+    return None
+
+
+def trial_id(journal: Journal, trial: Trial) -> str:
+    """The name by which the robot's ledger knows a trial."""
+    return f"{journal.name}-{trial.number:03d}"
+
+
+def record(journal: Journal, trial: Trial, new: State, who: str, body: Mapping[str, Any]) -> Trial:
+    """Moves a trial on from exactly the version that the caller has seen, and returns what it became."""
+    journal.record(trial.number, new, who, body, f"{trial.number}/{trial.version}/{new}")
+    return journal.trial(trial.number)
+
+
+def _standing(campaign: Campaign) -> Standing:
+    return standing(campaign.journal.trials(), campaign.journal.identity)
+
+
+def _step(campaign: Campaign) -> Trial:
+    """One transition of the open trial, or the proposal of a new one."""
+    trial = next((trial for trial in campaign.journal.trials() if trial.state not in TERMINAL), None)
+    return propose(campaign) if trial is None else _STEPS[trial.state](campaign, trial)
+
+
+def propose(campaign: Campaign) -> Trial:
+    """Stores the next controller, a function of the journal alone: a kill before or after changes nothing."""
+    trials, seed = campaign.journal.trials(), campaign.journal.identity.seed
+    number, past = len(trials), history(trials, campaign.dimensions)
+    if len(past) < RANDOM_TRIALS:
+        kind, x = "random", generator(seed, "initial", number).random(campaign.dimensions)
+    else:
+        kind, x = "suggested", campaign.suggest(past, generator(seed, "suggestion", number))
+    facts = {
+        "based_on": [trial.number for trial in trials if trial.state is State.MEASURED],
+        "versions": campaign.versions,
+    }
+    # Setups take controllers rounded to float32; what the journal holds is what moves the robot.
+    campaign.journal.propose(number, x.astype(np.float32).astype(np.float64), kind, "campaign", facts)
+    return campaign.journal.trial(number)
+
+
+def _check(campaign: Campaign, trial: Trial) -> Trial:
+    reason = objection(trial.x, campaign.dimensions)
+    if reason is not None:
+        return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": reason})
+    facts = {"predicted_y": campaign.predict(trial.x)}
+    return record(campaign.journal, trial, State.CHECKED, "limits", facts)
+
+
+def _approve_by_policy(campaign: Campaign, trial: Trial) -> Trial:
+    return approve(campaign.journal, trial, "policy: rehearsal")
+
+
+def approve(journal: Journal, trial: Trial, who: str) -> Trial:
+    """Lets one trial onto the robot; the approval names the bytes of its controller."""
+    return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256})
+
+
+def _perform(campaign: Campaign, trial: Trial) -> Trial:
+    """Moves the robot once; what the driver declares a fault is failed, all else that breaks is unknown."""
+    journal = campaign.journal
+    granted = record(journal, trial, State.GRANTED, "executor", campaign.process)
+    running = record(journal, granted, State.RUNNING, "executor", campaign.process)
+    try:
+        measured = campaign.robot.run(trial_id(journal, trial), running.x)
+    except RobotFault as fault:
+        return record(journal, running, State.FAILED, "executor", {"fault": str(fault)})
+    return record(journal, running, State.MEASURED, "executor", asdict(measured))
+
+
+_STEPS: Mapping[State, Callable[[Campaign, Trial], Trial]] = {
+    State.PROPOSED: _check,
+    State.CHECKED: _approve_by_policy,
+    State.APPROVED: _perform,
+}

@@ -1,0 +1,74 @@
+"""What makes a hardware campaign this one and no other."""
+
+import hashlib
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+
+from cluster.errors import UserError
+from cluster.hardware.events import canonical
+
+
+class IdentityMismatch(UserError):  # noqa: N818 - it is an expected refusal, not a defect
+    """A folder holds another campaign than the one asked for."""
+
+
+class Approval(StrEnum):
+    """Who lets a checked controller onto the robot."""
+
+    POLICY = "policy"
+    OPERATOR = "operator"
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The arguments from which every proposal of a campaign follows, and who approves them.
+
+    Attributes:
+        robot: name in the registry.
+        setup: name of the robot's setup.
+        method: that suggests the controllers.
+        seed: of every random draw, at least 0.
+        model: SHA-256 of the checkpoint; "" for a method without a model.
+        pool: number of random controllers the method chooses from, at least 1.
+        trials: suggested trials after the random ones, at least 0.
+        approval: who lets a controller onto the robot.
+    """
+
+    robot: str
+    setup: str
+    method: str
+    seed: int
+    model: str
+    pool: int
+    trials: int
+    approval: Approval
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ValueError(f"seed must be at least 0, got {self.seed}")
+        if self.pool < 1:
+            raise ValueError(f"pool must be at least 1, got {self.pool}")
+        if self.trials < 0:
+            raise ValueError(f"trials must be at least 0, got {self.trials}")
+
+    def genesis(self, name: str) -> str:
+        """Hash that the first event of the campaign called `name` follows."""
+        return hashlib.sha256(canonical({**asdict(self), "name": name}).encode()).hexdigest()
+
+    def require(self, asked: "Identity", place: str) -> None:
+        """Refuses another campaign in the same folder.
+
+        Args:
+            asked: identity of the campaign that wants to go on here.
+            place: the journal, for the message.
+
+        Raises:
+            IdentityMismatch: naming the first field that differs.
+        """
+        for field, here in asdict(self).items():
+            there = getattr(asked, field)
+            if here != there:
+                raise IdentityMismatch(
+                    f"{place} holds a campaign with {field} {str(here)!r}, asked for {str(there)!r}; "
+                    f"repeat the command with {field} {str(here)!r} or choose another folder"
+                )

@@ -1,0 +1,62 @@
+"""What a person asks for when starting a campaign."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cluster.errors import UsageError
+from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.proposals import fingerprint
+from svaedc import methods
+from workers.hardware import robots
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a person asks for.
+
+    Attributes:
+        identity: of the campaign.
+        folder: of its journal and ledger, on a local disk of the robot's machine; kept absolute.
+        model: checkpoint, kept absolute; None for a method without one.
+        pace: least duration of a trial on a rehearsal robot, in s.
+    """
+
+    identity: Identity
+    folder: Path
+    model: Path | None
+    pace: float
+
+    def __post_init__(self) -> None:
+        if self.pace < 0.0:
+            raise UsageError(f"pace must be at least 0 s, got {self.pace}")
+        # The process that carries it out has a working directory of its own.
+        object.__setattr__(self, "folder", self.folder.absolute())
+        object.__setattr__(self, "model", self.model and self.model.absolute())
+
+
+def identify(
+    robot: str, method: str, trials: int, seed: int, pool: int, model: Path | None, approval: Approval
+) -> Identity:
+    """What a campaign with these arguments is.
+
+    Args:
+        robot: in the registry.
+        method: of `svaedc.methods`.
+        trials: suggested trials after the random ones, at least 0.
+        seed: of every random draw, at least 0.
+        pool: number of random controllers the method chooses from, at least 1.
+        model: checkpoint; ignored by methods without a model.
+        approval: who approves.
+
+    Raises:
+        UsageError: when a name or number is none that exists; the message names the nearest.
+        UserError: when the model cannot be read.
+    """
+    try:
+        setup, needs_model = robots.find(robot).setup, methods.needs_model(method)
+        if needs_model and model is None:
+            raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
+        digest = fingerprint(model) if needs_model and model else ""
+        return Identity(robot, setup, method, seed, digest, pool, trials, approval)
+    except (LookupError, ValueError) as error:
+        raise UsageError(str(error.args[0])) from error

@@ -1,0 +1,90 @@
+"""From a campaign's plan to the method that proposes its controllers."""
+
+import hashlib
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from cluster.errors import UserError
+from cluster.hardware.campaign import Suggest
+from cluster.hardware.identity import Identity
+from svaedc import checkpoint, methods
+from svaedc.candidates import Problem
+from svaedc.features import Latents
+from workers.randomness import generator
+from workers.setups import Setup
+
+LIBRARIES = ("numpy", "torch", "gpytorch", "botorch")
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """A campaign's method, and what its model expects of a controller.
+
+    Attributes:
+        suggest: the method.
+        latents: of the model; None for a method without one.
+    """
+
+    suggest: Suggest
+    latents: Latents | None
+
+    @classmethod
+    def of(cls, identity: Identity, setup: Setup, model: Path | None) -> "Proposals":
+        """Builds the method from the campaign's identity alone, so that every process builds the same.
+
+        Raises:
+            LookupError: when there is no such method.
+            UserError: when the model is missing, damaged, or another setup's.
+        """
+        pool = (
+            generator(identity.seed, "pool", 0).random((identity.pool, setup.dimensions)).astype(np.float32)
+        )
+        latents = _latents(identity, model, pool) if methods.needs_model(identity.method) else None
+        problem = Problem(setup.dimensions, setup.objective_limits, pool, latents)
+        return cls(methods.build(identity.method, problem).suggest, latents)
+
+    def predicted_badness(self, x: Float[np.ndarray, " D"]) -> float | None:
+        """Badness of x as the model expects it, in [0, 1]; None without a model."""
+        if self.latents is None:
+            return None
+        return float(self.latents.means(torch.tensor(x[None]))[1])
+
+
+def fingerprint(model: Path | None) -> str:
+    """SHA-256 of a checkpoint file; "" for none.
+
+    Raises:
+        UserError: when the file cannot be read.
+    """
+    if model is None:
+        return ""
+    try:
+        with model.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise UserError(
+            f"cannot read the model {model}: {error.strerror}; name a checkpoint of svaedc train"
+        ) from error
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries whose arithmetic a proposal depends on."""
+    return {library: version(library) for library in LIBRARIES}
+
+
+def _latents(identity: Identity, model: Path | None, pool: Float[np.ndarray, "n D"]) -> Latents:
+    if model is None:
+        raise UserError(f"method {identity.method!r} needs a trained model, got none; give one with --model")
+    if fingerprint(model) != identity.model:
+        raise UserError(f"the model {model} is not the one this campaign was planned with; restore that file")
+    try:
+        network, metadata = checkpoint.load(model)
+        checkpoint.require(model, metadata, {"setup": identity.setup})
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    return Latents.of(torch.tensor(pool), network.requires_grad_(requires_grad=False).latent_means)

@@ -1,0 +1,100 @@
+"""How a campaign stands, for a person: its trials, what it needs next, and the command that gives it that."""
+
+import json
+from dataclasses import dataclass
+
+from cluster.hardware.events import Trial
+from cluster.hardware.identity import Identity
+from cluster.hardware.journal import Journal
+from cluster.hardware.lock import Process
+from cluster.hardware.standing import Standing, measured, planned, standing
+from cluster.hardware.states import TERMINAL, State
+
+REASONS = {State.FAILED: "fault", State.REJECTED: "reason"}
+
+
+@dataclass(frozen=True)
+class Status:
+    """One look at a campaign.
+
+    Attributes:
+        name: of the campaign.
+        identity: of the campaign.
+        standing: what it needs next.
+        trials: by number.
+        advice: a sentence for the person in charge; "" when nothing is asked of them.
+    """
+
+    name: str
+    identity: Identity
+    standing: Standing
+    trials: tuple[Trial, ...]
+    advice: str
+
+    @property
+    def planned(self) -> int:
+        """Measured trials after which the campaign is complete."""
+        return planned(self.identity)
+
+    @property
+    def measured(self) -> int:
+        """Trials measured so far."""
+        return measured(self.trials)
+
+    @property
+    def best(self) -> float | None:
+        """Largest objective measured so far."""
+        return max((trial.f for trial in self.trials if trial.f is not None), default=None)
+
+
+def status(journal: Journal, executor: Process | None) -> Status:
+    """Looks at a campaign.
+
+    Args:
+        journal: of the campaign.
+        executor: the live process that executes it; None when there is none.
+    """
+    trials = journal.trials()
+    now = standing(trials, journal.identity)
+    return Status(journal.name, journal.identity, now, trials, _advice(journal, trials, now, executor))
+
+
+def _advice(journal: Journal, trials: tuple[Trial, ...], now: Standing, executor: Process | None) -> str:
+    folder = journal.path.parent
+    number = next((trial.number for trial in trials if trial.state not in TERMINAL), None)
+    if now is Standing.AWAITS_RESOLUTION:
+        return (
+            f"trial {number} may have moved the robot when the program died{_on_record(journal)}. When the "
+            f"robot stands still and is reset: svaedc hardware resolve {folder} --trial {number} "
+            "--outcome measured|failed|aborted --who NAME --note TEXT (--f and --y for measured); "
+            "then repeat the start command"
+        )
+    if now is Standing.AWAITS_APPROVAL:
+        return f"trial {number} waits: svaedc hardware approve {folder} --trial {number} --who NAME"
+    if trials and trials[-1].state in REASONS:
+        return f"trial {trials[-1].number} was {_reason(journal)}; see to it, then repeat the start command"
+    if executor is not None:
+        return f"executed by {executor}"
+    if now is Standing.RUNNING:
+        return (
+            f"trial {number} was left behind by a dead process: repeat the start command to have it examined"
+        )
+    return "" if now is Standing.COMPLETE else "repeat the start command to go on"
+
+
+def _reason(journal: Journal) -> str:
+    """Why the last trial failed or was rejected."""
+    last = journal.events()[-1]
+    body = json.loads(last.body)
+    return f"{last.new}: {body.get(REASONS[last.new], body.get('note'))}"
+
+
+def _on_record(journal: Journal) -> str:
+    """What the robot's ledger knew of the unknown trial when it was found."""
+    found = next(event for event in reversed(journal.events()) if event.new is State.UNKNOWN)
+    ledger = json.loads(found.body).get("ledger")
+    if ledger is None:
+        return ""
+    if ledger["measurement"] is None:
+        return " (its ledger: started, never ended)" if ledger["started"] else " (its ledger: never started)"
+    return f" (its ledger: ended with f {ledger['measurement']['f']}, y {ledger['measurement']['y']})"
