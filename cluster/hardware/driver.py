@@ -1,4 +1,4 @@
-"""`svaedc hardware start`: one serialized Ray actor at the robot, and the loop that asks it for trial after trial."""
+"""`svaedc hardware start`: one serialized Ray actor at the robot, asked for one trial after the other."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -118,7 +118,7 @@ def _at_the_robot(options: dict[str, Any], plan: Plan) -> Iterator[tuple[Any, St
 
 def _entered(options: dict[str, Any], plan: Plan) -> tuple[Any, Status]:
     for _ in range(ENTRANCES):
-        actor = ray.remote(HardwareActor).options(**options).remote()
+        actor: Any = ray.remote(HardwareActor).options(**options).remote()
         try:
             return actor, ray.get(actor.enter.remote(plan))
         except ActorDiedError:
@@ -130,7 +130,7 @@ def _entered(options: dict[str, Any], plan: Plan) -> tuple[Any, Status]:
             actor.__ray_terminate__.remote()
             raise
     raise UserError(
-        f"the actor {options['name']} dies whenever it is started; look into the Ray logs of the robot's machine"
+        f"the actor {options['name']} dies whenever it starts; look into the Ray logs of the robot's machine"
     )
 
 
@@ -191,8 +191,8 @@ def _after_loss(plan: Plan) -> str:
     """What is known once the actor is gone: a trial it may have been running is unknown, never repeated."""
     if not (plan.folder / journal.FILE).exists():
         return (
-            "lost the process at the robot; whether its trial ran is not known here: repeat the start command, "
-            "which examines it, or look with svaedc hardware status on the robot's machine"
+            "lost the process at the robot; whether its trial ran is not known here: repeat the start "
+            "command, which examines it, or look with svaedc hardware status on the robot's machine"
         )
     operator.close_abandoned(plan.folder, LEAVE_SECONDS)
     return f"lost the process at the robot; {operator.status(plan.folder).advice}"
