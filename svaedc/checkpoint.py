@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import zipfile
 from pathlib import Path
 from typing import Any, Final
 
@@ -96,8 +97,20 @@ def read(path: Path, device: torch.device = CPU) -> dict[str, Any]:
         ValueError: The file is damaged or holds other objects.
     """
     try:
+        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            # Torch checks no sums: a flipped bit would come back as another weight.
+            damaged = archive.testzip()
+        if damaged is not None:
+            raise ValueError(f"the checksum of {damaged} is wrong")
         content = torch.load(path, map_location=device, weights_only=True)
-    except (RuntimeError, EOFError, pickle.UnpicklingError, KeyError, ValueError) as error:
+    except (
+        zipfile.BadZipFile,
+        RuntimeError,
+        EOFError,
+        pickle.UnpicklingError,
+        KeyError,
+        ValueError,
+    ) as error:
         raise ValueError(f"{path} is damaged or not a checkpoint; restore it or train again") from error
     if not isinstance(content, dict):
         raise ValueError(f"{path} must hold a dictionary, found {type(content).__name__}; train again")

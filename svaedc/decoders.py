@@ -1,6 +1,6 @@
 """Heads of p(xi|tau): the paper's dense one and a low-rank one around the median trajectory."""
 
-from typing import final
+from typing import Final, final
 
 import torch
 from jaxtyping import Float
@@ -92,4 +92,4 @@ class LowRankHead(nn.Module):
         return self.family(self.median + self.spread * residual, scale)
 
 
-HEADS = {"dense": DenseHead, "low-rank": LowRankHead}
+HEADS: Final[dict[str, type[DenseHead] | type[LowRankHead]]] = {"dense": DenseHead, "low-rank": LowRankHead}

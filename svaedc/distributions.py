@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Final, Self, final
+from typing import Final, final
 
 import torch
 from jaxtyping import Float
@@ -50,7 +50,7 @@ class Diagonal(ABC):
         """Draw from the standard distribution, shaped like `loc`."""
 
     @abstractmethod
-    def _kl_elements(self, p: Self) -> Tensor:
+    def _kl_elements(self, p: "Diagonal") -> Tensor:
         """KL(self || p) of each element."""
 
 
@@ -72,7 +72,7 @@ class DiagonalLaplace(Diagonal):
         u = torch.empty_like(self.loc).uniform_(torch.finfo(self.loc.dtype).eps - 1.0, 1.0)
         return -u.sign() * torch.log1p(-u.abs())
 
-    def _kl_elements(self, p: Self) -> Tensor:
+    def _kl_elements(self, p: "Diagonal") -> Tensor:
         distance = (self.loc - p.loc).abs()
         ratio = self.scale / p.scale
         return -ratio.log() + distance / p.scale + ratio * torch.exp(-distance / self.scale) - 1.0
@@ -94,7 +94,7 @@ class DiagonalGaussian(Diagonal):
     def _standard_noise(self) -> Tensor:
         return torch.randn_like(self.loc)
 
-    def _kl_elements(self, p: Self) -> Tensor:
+    def _kl_elements(self, p: "Diagonal") -> Tensor:
         ratio = self.scale / p.scale
         return 0.5 * (ratio.square() + ((self.loc - p.loc) / p.scale).square() - 1.0) - ratio.log()
 

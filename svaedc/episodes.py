@@ -1,7 +1,7 @@
 """Rows of a training cache as the model sees them, gathered in batches from arrays or memory maps."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -30,10 +30,10 @@ class Episodes:
         rows: Rows of the arrays that belong to this selection.
     """
 
-    x: Float32[np.ndarray, "all controller"]
-    xi: Float32[np.ndarray, "all obs time"]
-    bad: Float32[np.ndarray, "all time"]
-    y: Float32[np.ndarray, " all"]
+    x: Float32[np.ndarray, "_ controller"]
+    xi: Float32[np.ndarray, "_ obs time"]
+    bad: Float32[np.ndarray, "_ time"]
+    y: Float32[np.ndarray, " _"]
     rows: Integer[np.ndarray, " episodes"]
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ class Episodes:
         columns = (torch.from_numpy(np.asarray(array[rows])) for array in (self.x, self.xi, self.bad, self.y))
         return Batch(*(column.to(device) for column in columns))
 
-    def sample(self, count: int, rng: np.random.Generator) -> Self:
+    def sample(self, count: int, rng: np.random.Generator) -> "Episodes":
         """At most `count` of the episodes, drawn without replacement, in storage order."""
         return replace(self, rows=self.rows[np.sort(rng.permutation(len(self))[:count])])
 

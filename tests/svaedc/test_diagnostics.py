@@ -1,0 +1,111 @@
+"""Diagnostics against models whose answers are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from svaedc.diagnostics import collapse, evaluate
+
+GOOD = {"active_share": 1.0, "rec_norm": 0.5, "gen_norm": 0.6, "corr_y_rec": 0.99}
+
+
+@pytest.fixture
+def median_only(model):
+    """A model whose decoder ignores the latent path and returns the per-step median."""
+    torch.nn.init.zeros_(model.decoder.coefficients.weight)
+    torch.nn.init.zeros_(model.decoder.coefficients.bias)
+    return model
+
+
+def test_a_decoder_of_the_median_scores_exactly_one(median_only, halves):
+    metrics = evaluate(median_only, halves[1])
+    assert [metrics[name] for name in ("rec_norm", "rec_raw", "gen_norm", "gen_raw")] == [1.0] * 4
+
+
+def test_a_prior_that_ignores_the_controller_has_no_active_dimension(model, halves):
+    torch.nn.init.zeros_(model.prior_network.latent.linear.weight)
+    metrics = evaluate(model, halves[1])
+    assert metrics["active_dimensions"] == 0.0
+    assert metrics["active_share"] == 0.0
+    assert metrics["corr_y_gen"] == 0.0
+
+
+def test_a_dimension_counts_as_active_by_its_spread_relative_to_the_posterior(model, halves):
+    with torch.no_grad():
+        linear = model.prior_network.latent.linear
+        linear.weight[3] = 0.0
+        linear.weight[:9] *= 1e3
+    assert evaluate(model, halves[1])["active_dimensions"] == 8.0
+
+
+def test_relative_errors_are_those_of_plain_loops(model, halves):
+    held_out = halves[1]
+    with torch.no_grad():
+        generated = model.eval().generate(torch.from_numpy(held_out.x[held_out.rows])).numpy()
+    truth = held_out.xi[held_out.rows]
+    median = model.normaliser.unscaled(model.normaliser.median[None])[0].numpy()
+    ratios = [
+        np.abs(generated[:, d] - truth[:, d]).mean() / np.abs(median[d] - truth[:, d]).mean()
+        for d in range(5)
+    ]
+    metrics = evaluate(model, held_out)
+    assert metrics["gen_norm"] == pytest.approx(np.mean(ratios), rel=1e-4)
+    overall = np.abs(generated - truth).mean() / np.abs(median - truth).mean()
+    assert metrics["gen_raw"] == pytest.approx(overall, rel=1e-4)
+
+
+def test_the_bound_is_the_sum_of_its_reported_terms(model, halves):
+    metrics = evaluate(model, halves[1])
+    terms = metrics["log_p_xi"] + metrics["log_p_y"] - metrics["kl"]
+    assert metrics["elbo"] == pytest.approx(terms)
+
+
+def test_evaluation_repeats_and_leaves_mode_and_generator_alone(model, halves):
+    model.train()
+    torch.manual_seed(1)
+    expected = torch.rand(1)
+    torch.manual_seed(1)
+    first = evaluate(model, halves[1])
+    assert torch.equal(torch.rand(1), expected)
+    assert model.training
+    assert evaluate(model, halves[1]) == first
+
+
+def test_a_dimension_that_never_moves_is_left_out_of_the_errors(model, halves):
+    held_out = halves[1]
+    xi = held_out.xi.copy()
+    xi[:, 2] = model.normaliser.unscaled(model.normaliser.median[None])[0, 2].numpy()
+    with torch.no_grad():
+        model.normaliser.median[2] = model.normaliser.scaled(torch.from_numpy(xi[:1]))[0, 2]
+    assert np.isfinite(evaluate(model, replace(held_out, xi=xi))["gen_norm"])
+
+
+def test_without_any_bad_step_the_correlation_is_undefined_and_no_collapse(model, halves):
+    held_out = replace(halves[1], y=np.zeros_like(halves[1].y))
+    metrics = evaluate(model, held_out)
+    assert np.isnan(metrics["corr_y_gen"])
+    assert collapse(GOOD | {"corr_y_rec": metrics["corr_y_rec"]}) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "remedy"),
+    [
+        ({"active_share": 0.2}, "active_share is 0.20; lower the KL weight"),
+        ({"rec_norm": 1.0}, "rec_norm is 1.00; raise the learning rate"),
+        ({"gen_norm": 1.1}, "gen_norm is 1.10; collect more episodes"),
+        ({"corr_y_rec": 0.1}, "corr_y_rec is 0.10; use the `balanced` weighting"),
+    ],
+)
+def test_a_collapse_is_named_with_a_remedy(change, remedy):
+    assert remedy in (collapse(GOOD | change) or "")
+
+
+def test_a_model_that_learnt_something_has_not_collapsed():
+    assert collapse(GOOD) is None
+
+
+def test_one_held_out_episode_is_refused(model, halves):
+    with pytest.raises(ValueError, match="at least 2 held-out episodes, got 1"):
+        evaluate(model, replace(halves[1], rows=halves[1].rows[:1]))
