@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -20,6 +20,7 @@ LEAST_BAD = 0.3
 """Share of the pool that screening keeps."""
 
 
+@runtime_checkable
 class Method(Protocol):
     """A way to choose the next controller."""
 

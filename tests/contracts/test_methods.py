@@ -1,0 +1,78 @@
+"""What every method obeys, whatever it does inside."""
+
+import numpy as np
+import pytest
+import torch
+
+from svaedc import methods
+from svaedc.history import History
+from tests.svaedc.fake_latents import problem, quadratic
+
+DIMENSIONS, CANDIDATES = 4, 60
+ON_POOL = [name for name in methods.names() if name not in {"random", "botorch"}]
+
+
+def history(count):
+    grown = History.empty(DIMENSIONS)
+    for x in np.random.default_rng(5).random((count, DIMENSIONS), dtype=np.float32):
+        grown = grown.append(x, quadratic(x))
+    return grown
+
+
+def built(name):
+    return methods.build(name, problem(DIMENSIONS, CANDIDATES, seed=3))
+
+
+every_method = pytest.mark.parametrize("name", methods.names())
+
+
+@every_method
+@pytest.mark.parametrize("count", [0, 1, 2, 6])
+def test_suggestion_is_a_controller_in_the_unit_cube(name, count):
+    x = built(name).suggest(history(count), np.random.default_rng(0))
+    assert x.shape == (DIMENSIONS,)
+    assert x.dtype == np.float32
+    assert ((x >= 0) & (x <= 1)).all()
+
+
+@every_method
+def test_suggestion_depends_on_history_and_generator_alone(name):
+    method = built(name)
+    first = method.suggest(history(5), np.random.default_rng(1))
+    method.suggest(history(3), np.random.default_rng(2))
+    torch.manual_seed(99)
+    np.testing.assert_array_equal(method.suggest(history(5), np.random.default_rng(1)), first)
+    np.testing.assert_array_equal(built(name).suggest(history(5), np.random.default_rng(1)), first)
+
+
+@every_method
+def test_suggesting_changes_neither_history_nor_pool_nor_torch(name):
+    given = problem(DIMENSIONS, CANDIDATES, seed=3)
+    pool, tau, past = given.pool.copy(), given.latents.tau.clone(), history(4)
+    x, f, state = past.x.copy(), past.f.copy(), torch.get_rng_state()
+    suggested = methods.build(name, given).suggest(past, np.random.default_rng(0))
+    suggested[:] = 0
+    np.testing.assert_array_equal(given.pool, pool)
+    assert torch.equal(given.latents.tau, tau)
+    np.testing.assert_array_equal(past.x, x)
+    np.testing.assert_array_equal(past.f, f)
+    assert torch.equal(torch.get_rng_state(), state)
+
+
+@every_method
+def test_suggestions_are_all_different(name):
+    method, grown = built(name), history(2)
+    for index in range(8):
+        x = method.suggest(grown, np.random.default_rng(index))
+        assert not (grown.tried == x).all(axis=1).any()
+        # A flat objective tempts an optimiser to stay.
+        grown = grown.append(x, 0.2)
+
+
+@pytest.mark.parametrize("name", ON_POOL)
+def test_method_on_a_pool_suggests_its_controllers_bit_for_bit(name):
+    given = problem(DIMENSIONS, CANDIDATES, seed=3)
+    method = methods.build(name, given)
+    for count in (0, 3):
+        x = method.suggest(history(count), np.random.default_rng(0))
+        assert (given.pool == x).all(axis=1).any()

@@ -1,0 +1,29 @@
+"""A stand-in for the trained model: latent paths linear in x, and a smooth badness."""
+
+import numpy as np
+import torch
+
+from svaedc.candidates import Problem
+from svaedc.features import Latents
+
+TAU_DIMENSIONS = 3
+
+
+def latent_means(x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """tau = (x - 1/2) A with a fixed A, y = sigmoid(6 (x_0 - 1/2)): large x_0 is bad."""
+    a = torch.linspace(-1, 1, x.shape[1] * TAU_DIMENSIONS, dtype=x.dtype).cos().reshape(x.shape[1], -1)
+    return (x - 0.5) @ (a + torch.eye(x.shape[1], TAU_DIMENSIONS, dtype=x.dtype)), torch.sigmoid(
+        6 * (x[:, 0] - 0.5)
+    )
+
+
+def problem(dimensions: int, candidates: int, seed: int) -> Problem:
+    """A run's problem with a random pool and its fake latents, objectives between -1 and 1."""
+    pool = np.random.default_rng(seed).random((candidates, dimensions), dtype=np.float32)
+    latents = Latents.of(torch.tensor(pool), latent_means)
+    return Problem(dimensions, (-1.0, 1.0), pool, latents)
+
+
+def quadratic(x: np.ndarray) -> float:
+    """1 at x = 0.3, falling with the squared distance."""
+    return float(1 - 4 * ((x.astype(float) - 0.3) ** 2).sum())

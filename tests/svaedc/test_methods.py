@@ -1,0 +1,139 @@
+import numpy as np
+import pytest
+import torch
+
+from svaedc import methods
+from svaedc.candidates import Problem, as_they_are, by_latents
+from svaedc.features import svae_dc
+from svaedc.history import History
+from tests.svaedc.fake_latents import problem, quadratic
+
+
+def best_of_run(name, seed, count=12):
+    method = methods.build(name, problem(2, 400, seed))
+    rng = np.random.default_rng(1000 + seed)
+    history = History.empty(2)
+    for x in rng.random((2, 2), dtype=np.float32):
+        history = history.append(x, quadratic(x))
+    for _ in range(count):
+        x = method.suggest(history, rng)
+        history = history.append(x, quadratic(x))
+    return history.f.max()
+
+
+@pytest.mark.parametrize("name", ["se", "matern", "svae"])
+def test_optimisation_comes_closer_to_the_optimum_than_random_search(name):
+    regret = {
+        method: np.mean([1 - best_of_run(method, seed) for seed in range(4)]) for method in ("random", name)
+    }
+    assert regret[name] < 0.3 * regret["random"]
+
+
+@pytest.mark.parametrize("name", ["screened-random", "screened-svae"])
+def test_screening_suggests_only_from_the_least_bad_share(name):
+    given = problem(3, 100, 0)
+    kept = given.pool[np.argsort(given.latents.y.numpy())[:30]]
+    method = methods.build(name, given)
+    history = History.empty(3)
+    for index in range(12):
+        x = method.suggest(history, np.random.default_rng(index))
+        assert (kept == x).all(axis=1).any()
+        history = history.append(x, quadratic(x))
+
+
+def test_screened_random_search_exhausts_its_share_and_says_so():
+    method = methods.build("screened-random", problem(3, 10, 0))
+    history = History.empty(3)
+    for index in range(3):
+        history = history.append(method.suggest(history, np.random.default_rng(index)), 0.0)
+    with pytest.raises(ValueError, match=r"all 3 candidates have been tried.*larger pool"):
+        method.suggest(history, np.random.default_rng(9))
+
+
+def test_compression_spends_fewer_trials_on_controllers_predicted_bad():
+    def mean_badness(name):
+        badness = []
+        for seed in range(4):
+            given = problem(4, 300, seed)
+            method, history, rng = methods.build(name, given), History.empty(4), np.random.default_rng(seed)
+            for _ in range(12):
+                x = method.suggest(history, rng)
+                y = given.latents.means(torch.tensor(x)[None])[1].item()
+                badness.append(y)
+                history = history.append(x, float(-y))
+        return np.mean(badness)
+
+    assert mean_badness("svae-dc") < mean_badness("random") - 0.1
+
+
+def test_controller_that_failed_is_not_suggested_again():
+    method = methods.build("se", problem(2, 50, 0))
+    history = History.empty(2).append(np.full(2, 0.5, dtype=np.float32), 0.3)
+    first = method.suggest(history, np.random.default_rng(0))
+    second = method.suggest(history.append(first, float("nan")), np.random.default_rng(0))
+    assert not np.array_equal(first, second)
+
+
+def test_search_off_the_pool_needs_neither_model_nor_pool():
+    bare = Problem(30, (0.0, 13.0), np.empty((0, 30), dtype=np.float32))
+    history = History.empty(30)
+    rng = np.random.default_rng(0)
+    for x in rng.random((4, 30), dtype=np.float32):
+        history = history.append(x, float(((x[:3] + 1) ** 2).sum()))
+    x = methods.build("botorch", bare).suggest(history, rng)
+    assert x.shape == (30,)
+    assert (x[:3] + 1).sum() > 5
+
+
+def test_features_are_in_units_of_their_typical_distance():
+    given = problem(4, 200, 0)
+    for candidates in (as_they_are(given), by_latents(given, svae_dc)):
+        assert torch.pdist(candidates.phi).square().mean().sqrt().item() == pytest.approx(1, rel=0.01)
+
+
+def test_measured_controller_of_the_pool_has_the_features_of_its_candidate():
+    given = problem(4, 20, 0)
+    candidates = by_latents(given, svae_dc)
+    torch.testing.assert_close(candidates.features_of(given.pool.astype(float)), candidates.phi)
+
+
+def test_pool_of_identical_controllers_is_no_division_by_zero():
+    flat = Problem(2, (0.0, 1.0), np.full((3, 2), 0.5, dtype=np.float32))
+    assert torch.isfinite(as_they_are(flat).phi).all()
+
+
+def test_model_is_needed_exactly_where_latents_are_used():
+    assert [name for name in methods.names() if methods.needs_model(name)] == [
+        "screened-random",
+        "screened-svae",
+        "svae",
+        "svae-dc",
+        "svae-dc-whitened",
+    ]
+
+
+def test_unknown_method_is_refused_with_the_nearest_name():
+    for use in (methods.needs_model, lambda name: methods.build(name, problem(2, 5, 0))):
+        with pytest.raises(LookupError, match=r"'svae-cd'.*did you mean 'svae-dc'"):
+            use("svae-cd")
+
+
+def test_method_without_its_model_or_pool_says_what_to_do():
+    pool = problem(2, 5, 0).pool
+    for name in filter(methods.needs_model, methods.names()):
+        with pytest.raises(ValueError, match=rf"'{name}': latents must be.*train one"):
+            methods.build(name, Problem(2, (0.0, 1.0), pool))
+    with pytest.raises(ValueError, match=r"'se'.*got 0 controllers"):
+        methods.build("se", Problem(2, (0.0, 1.0), pool[:0]))
+
+
+def test_parts_of_a_problem_that_do_not_belong_together_are_refused():
+    given = problem(2, 5, 0)
+    with pytest.raises(ValueError, match=r"low < high, got \(1.0, 1.0\)"):
+        Problem(2, (1.0, 1.0), given.pool)
+    with pytest.raises(ValueError, match=r"pool must be \[n, 3\], got \[5, 2\]"):
+        Problem(3, (0.0, 1.0), given.pool)
+    with pytest.raises(ValueError, match="unit cube"):
+        Problem(2, (0.0, 1.0), given.pool + 1)
+    with pytest.raises(ValueError, match="pool's 4 controllers, got 5"):
+        Problem(2, (0.0, 1.0), given.pool[:4], given.latents)
