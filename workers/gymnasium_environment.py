@@ -25,16 +25,18 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's `physics`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012
-
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self._environment = setup.open()
-        self.observation_space = _box(setup.observation)
-        self.action_space = _box(self._environment.action)
+        self._seen = _box(setup.observation)
+        self._commands = _box(self._environment.action)
+        self.observation_space = self._seen
+        self.action_space = self._commands
         self._records: list[Any] = []
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode; `seed` decides its physics and that of the episodes after it."""
         super().reset(seed=seed, options=options)
         physics = self._setup.physics.draw(self.np_random)
@@ -45,7 +47,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply one command for one control step."""
-        command: Sequence[float] = np.clip(action, self.action_space.low, self.action_space.high).tolist()
+        command: Sequence[float] = np.clip(action, self._commands.low, self._commands.high).tolist()
         self._records.append(self._environment.step(command))
         observed = self._environment.observed(self._records[-1:])
         ended = len(self._records) >= self._setup.horizon
@@ -57,7 +59,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._environment.close()
 
     def _row(self, observed: Observed) -> np.ndarray:
-        return np.clip(observed.xi[:, 0], self.observation_space.low, self.observation_space.high)
+        return np.clip(observed.xi[:, 0], self._seen.low, self._seen.high)
 
     def _objective(self) -> float:
         whole = self._environment.observed(self._records)

@@ -24,12 +24,14 @@ class PhysicsRanges:
         """Check every interval and freeze the mapping."""
         for name, (low, high) in self.intervals.items():
             if not (math.isfinite(low) and math.isfinite(high) and 0.0 <= low <= high):
-                raise ValueError(f"physics range of {name} must satisfy 0 <= low <= high, got [{low}, {high}]")
+                raise ValueError(
+                    f"physics range of {name} must satisfy 0 <= low <= high, got [{low}, {high}]"
+                )
         object.__setattr__(self, "intervals", MappingProxyType(dict(self.intervals)))
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
-        """One value per parameter, uniform in its interval, in the order of the names as declared."""
-        return {name: float(rng.uniform(low, high)) for name, (low, high) in self.intervals.items()}
+        """One value per parameter, uniform in its interval, drawn in the order of the names."""
+        return {name: float(rng.uniform(low, high)) for name, (low, high) in sorted(self.intervals.items())}
 
 
 def around(nominal: Mapping[str, float], spread: float) -> PhysicsRanges:

@@ -45,8 +45,14 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     """Run controller x for the setup's horizon under the given physics.
 
     Raises:
-        ValueError: when x is not a vector of D numbers in [0, 1].
+        ValueError: when x is not a vector of D numbers in [0, 1], or physics names other parameters than
+            the setup's.
     """
+    if physics.keys() != setup.physics.intervals.keys():
+        odd = sorted(physics.keys() ^ setup.physics.intervals.keys())
+        raise ValueError(
+            f"physics must name the parameters of {setup.name}; missing or unknown: {', '.join(odd)}"
+        )
     controller = unit_cube(x, setup.dimensions)
     environment.reset(physics)
     command = setup.controller.start(controller, environment, setup.horizon)
@@ -100,5 +106,3 @@ def _sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ..
 def _bits(is_bad: Bool[np.ndarray, "conditions time"]) -> UInt8[np.ndarray, " time"]:
     """One bit per condition, the first condition lowest."""
     return np.packbits(is_bad, axis=0, bitorder="little")[0]
-
-

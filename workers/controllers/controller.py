@@ -35,7 +35,7 @@ class Controller(ABC):
 
 
 def unit_cube(x: Sequence[float] | np.ndarray, dimensions: int) -> Float32[np.ndarray, " d"]:
-    """x as float32, refused unless it is a finite vector of D numbers in [0, 1].
+    """The controller x as float32, refused unless it is a finite vector of D numbers in [0, 1].
 
     Raises:
         ValueError: naming what is wrong with x.

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 
 from workers.controllers.controller import Command, Controller
+from workers.controllers.reference import ends, euler_angles, reference
 from workers.environments.environment import Channel
 from workers.environments.tabletop import Tabletop
 
@@ -68,118 +69,57 @@ class EndEffectorWaypoints(Controller):
         points = self.values(x).reshape(self._waypoints, 8)
         arm = environment.arm
         corners = np.vstack([arm.state.position, points[:, :3]])
-        turns = np.vstack([_euler(np.array(arm.state.orientation)), points[:, 3:6]])
+        turns = np.vstack([euler_angles(np.array(arm.state.orientation)), points[:, 3:6]])
         turns[0] += 2 * np.pi * np.round((turns[1] - turns[0]) / (2 * np.pi))  # the short way round
-        reference = _reference(corners, turns, horizon, environment.control_step)
-        gains = np.repeat(points[:, 6:], np.diff(_ends(horizon, self._waypoints)), axis=0)
-        steps = np.hstack([*reference, gains]).tolist()
+        targets = reference(corners, turns, horizon, environment.control_step)
+        gains = np.repeat(points[:, 6:], np.diff(ends(horizon, self._waypoints)), axis=0)
+        steps = list(zip(*(part.tolist() for part in (*targets, gains)), strict=True))
         turning, limits = self._turning, self._limits
 
         def command(step: int) -> Sequence[float]:
             state = arm.state
-            force = _force(steps[step], state.position, state.velocity)
-            moment = _moment(steps[step], turning, state.orientation, state.angular_velocity)
+            position, velocity, acceleration, orientation, spin, gains = steps[step]
+            force = _force(gains, position, velocity, acceleration, state.position, state.velocity)
+            moment = _moment(turning, orientation, spin, state.orientation, state.angular_velocity)
             return _torque(force, moment, arm.jacobian(), arm.gravity_torque(), limits)
 
         return command
 
 
-def _ends(horizon: int, waypoints: int) -> np.ndarray:
-    """Step at which each waypoint is reached, beginning with 0."""
-    return np.linspace(0, horizon, waypoints + 1).round().astype(int)
-
-
-def _reference(
-    corners: Float[np.ndarray, "points 3"], turns: Float[np.ndarray, "points 3"], horizon: int, dt: float
-) -> tuple[np.ndarray, ...]:
-    """Desired position, velocity, acceleration, orientation quaternion, angular velocity of every step."""
-    pieces: list[tuple[np.ndarray, ...]] = []
-    ends = _ends(horizon, len(corners) - 1)
-    for begin, end, a, b, turn_a, turn_b in zip(
-        ends, ends[1:], corners, corners[1:], turns, turns[1:], strict=False
-    ):
-        duration = (end - begin) * dt
-        s = (np.arange(1, end - begin + 1) / (end - begin))[:, None]
-        quaternion = _quaternion(turn_a + s * (turn_b - turn_a))
-        pieces.append((*minimum_jerk(s, a, b, duration), quaternion))
-    position, velocity, acceleration, quaternion = (np.concatenate(part) for part in zip(*pieces, strict=True))
-    return position, velocity, acceleration, quaternion, _angular_velocity(quaternion, dt)
-
-
-def minimum_jerk(
-    s: Float[np.ndarray, "time 1"], a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], duration: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, velocity and acceleration of the minimum-jerk motion a → b at the fractions s of its duration.
-
-    Fifth-order polynomial with zero velocity and acceleration at both ends: 10 s³ − 15 s⁴ + 6 s⁵.
-    """
-    position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    velocity = (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
-    acceleration = (b - a) * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
-    return position, velocity, acceleration
-
-
-def _quaternion(euler: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, "time 4"]:
-    """Quaternions (x, y, z, w) of roll, pitch, yaw about the fixed axes."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(euler / 2).T, np.sin(euler / 2).T
-    return np.stack(
-        [
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        ],
-        axis=1,
-    )
-
-
-def _euler(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
-    """Roll, pitch, yaw about the fixed axes of a quaternion (x, y, z, w)."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-            np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
-            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-        ]
-    )
-
-
-def _angular_velocity(quaternion: Float[np.ndarray, "time 4"], dt: float) -> Float[np.ndarray, "time 3"]:
-    """Angular velocity, in the world, of a sequence of orientations: 2 q̇ q*."""
-    change = np.gradient(quaternion, dt, axis=0)
-    (x, y, z, w), (dx, dy, dz, dw) = quaternion.T, change.T
-    return 2 * np.stack(
-        [
-            -dw * x + dx * w - dy * z + dz * y,
-            -dw * y + dx * z + dy * w - dz * x,
-            -dw * z - dx * y + dy * x + dz * w,
-        ],
-        axis=1,
-    )
-
-
-def _force(step: Sequence[float], position: Sequence[float], velocity: Sequence[float]) -> list[float]:
-    """kp (p* − p) + kd (ṗ* − ṗ) + p̈*, in N (the acceleration acts on a mass of 1 kg)."""
-    kp, kd = step[16], step[17]
-    wanted = zip(step[0:3], step[3:6], step[6:9], position, velocity, strict=True)
-    return [kp * (p_ - p) + kd * (v_ - v) + a_ for p_, v_, a_, p, v in wanted]
+def _force(
+    gains: Sequence[float],
+    wanted_position: Sequence[float],
+    wanted_velocity: Sequence[float],
+    wanted_acceleration: Sequence[float],
+    position: Sequence[float],
+    velocity: Sequence[float],
+) -> list[float]:
+    """The force kp (p* − p) + kd (ṗ* − ṗ) + p̈*, in N (the acceleration acts on a mass of 1 kg)."""
+    kp, kd = gains
+    axes = zip(wanted_position, wanted_velocity, wanted_acceleration, position, velocity, strict=True)
+    return [kp * (p_ - p) + kd * (v_ - v) + a_ for p_, v_, a_, p, v in axes]
 
 
 def _moment(
-    step: Sequence[float], gains: tuple[float, float], orientation: Sequence[float], spin: Sequence[float]
+    gains: Sequence[float],
+    wanted_orientation: Sequence[float],
+    wanted_spin: Sequence[float],
+    orientation: Sequence[float],
+    spin: Sequence[float],
 ) -> list[float]:
-    """Kp e + Kd (ω* − ω), in N·m, with e the rotation vector from the present to the wanted orientation."""
+    """The moment Kp e + Kd (ω* − ω), in N·m; e = 2 sin(θ/2) · axis of the rotation still to be made."""
     kp, kd = gains
-    a, b, c, d = step[9:13]
+    a, b, c, d = wanted_orientation
     x, y, z, w = orientation
-    sign = 2.0 if a * x + b * y + c * z + d * w >= 0.0 else -2.0
+    sign = (
+        2.0 if a * x + b * y + c * z + d * w >= 0.0 else -2.0
+    )  # q and −q are one orientation: the short way
     error = (
         sign * (w * a - x * d - b * z + c * y),
         sign * (w * b - y * d - c * x + a * z),
         sign * (w * c - z * d - a * y + b * x),
     )
-    return [kp * e + kd * (w_ - w) for e, w_, w in zip(error, step[13:16], spin, strict=True)]
+    return [kp * e + kd * (w_ - w) for e, w_, w in zip(error, wanted_spin, spin, strict=True)]
 
 
 def _torque(
@@ -191,9 +131,13 @@ def _torque(
 ) -> list[float]:
     """Jᵀ [force; moment] + gravity, clipped to ± the limits."""
     (fx, fy, fz), (mx, my, mz) = force, moment
-    columns = zip(*jacobian[0], *jacobian[1], gravity, limits, strict=False)  # the arm's joints come first
+    linear, angular = jacobian
     torques = [
-        (a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g, limit)
-        for a, b, c, d, e, f, g, limit in columns
+        a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g
+        for a, b, c, d, e, f, g in zip(*linear, *angular, gravity, strict=True)
     ]
-    return [min(max(torque, -limit), limit) for torque, limit in torques]
+    # The arm's joints come first; behind them are the fingers, which have no limits here.
+    return [
+        limit if torque > limit else -limit if torque < -limit else torque
+        for torque, limit in zip(torques, limits, strict=False)
+    ]

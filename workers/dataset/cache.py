@@ -1,19 +1,25 @@
-"""The training cache: a dataset decoded once into memory-mapped arrays at the stride the model is trained with."""
+"""The training cache: a dataset decoded once into memory-mapped arrays, at the stride of training."""
 
+import errno
 import json
+import math
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Int64
 
-from workers.dataset import shards
 from workers.dataset.folder import Dataset
+from workers.dataset.identity import Identity
+from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
+
+Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class TrainingCache:
     f: Float32[np.ndarray, " n"]
 
     def held_out(self) -> np.ndarray:
-        """Rows kept from training: every tenth episode by its index, the same ones however far the data grows."""
+        """Rows kept from training: every tenth episode by its index, however far the data grows."""
         return np.flatnonzero(np.asarray(self.episode) % 10 == 9)
 
     def training(self) -> np.ndarray:
@@ -53,7 +59,9 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
         OSError: when the disk is too small; the error names both sizes.
     """
     if not 1 <= stride <= dataset.identity.horizon:
-        raise ValueError(f"stride must lie between 1 and the horizon {dataset.identity.horizon}, got {stride}")
+        raise ValueError(
+            f"stride must lie between 1 and the horizon {dataset.identity.horizon}, got {stride}"
+        )
     folder = parent / f"{dataset.fingerprint()[:16]}-stride{stride}"
     if not (folder / _READY).exists():
         _build(dataset, stride, folder)
@@ -62,18 +70,43 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
 
 
 def _build(dataset: Dataset, stride: int, folder: Path) -> None:
-    count = dataset.episodes()
+    count = dataset.sane_episodes()
     if count == 0:
-        raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
-    building = folder.with_name(f"{folder.name}.{shards.writer()}")
-    building.mkdir(parents=True, exist_ok=True)
+        raise ValueError(f"{dataset.folder} holds no episodes to train on; collect some first")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    _sweep(folder.parent)
+    layout = _layout(dataset.identity, stride, count)
+    needed = sum(np.dtype(kind).itemsize * math.prod(shape) for kind, shape in layout.values())
+    require_space(needed, shutil.disk_usage(folder.parent).free, folder.parent)
+    building = folder.with_name(f"{folder.name}.{writer()}")
+    building.mkdir(exist_ok=True)
     try:
-        _check_space(dataset, stride, count, building)
-        kept = _decode(dataset, stride, count, building)
-        (building / _READY).write_text(json.dumps({"episodes": kept, "stride": stride}) + "\n")
+        _decode(dataset, stride, layout, building)
+        (building / _READY).write_text(json.dumps({"episodes": count, "stride": stride}) + "\n")
         _move_into_place(building, folder)
     finally:
         shutil.rmtree(building, ignore_errors=True)
+
+
+def _sweep(parent: Path) -> None:
+    """Remove what builders left behind that were killed."""
+    for path in parent.iterdir():
+        if "-stride" in path.name and is_dead(path.name):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def require_space(needed: int, free: int, folder: Path) -> None:
+    """Refuse to begin a cache that will not fit.
+
+    Raises:
+        OSError: when more bytes are needed than are free; it names both, and the ways out.
+    """
+    if needed > free:
+        raise OSError(
+            errno.ENOSPC,
+            f"the training cache needs {needed / 1e9:.2f} GB below {folder}, only {free / 1e9:.2f} GB are "
+            "free; free some, choose another folder (train.cache), or a larger stride (train.stride)",
+        )
 
 
 def _move_into_place(building: Path, folder: Path) -> None:
@@ -85,22 +118,10 @@ def _move_into_place(building: Path, folder: Path) -> None:
             raise
 
 
-def _check_space(dataset: Dataset, stride: int, count: int, folder: Path) -> None:
-    identity = dataset.identity
+def _layout(identity: Identity, stride: int, count: int) -> Layout:
+    """Type and shape of every array."""
     samples = identity.horizon // stride
-    needed = 4 * count * (len(identity.parameters) + (len(identity.observation) + 1) * samples + 4)
-    free = shutil.disk_usage(folder).free
-    if needed > free:
-        raise OSError(
-            f"the training cache needs {needed / 1e9:.1f} GB below {folder.parent}, only {free / 1e9:.1f} GB are free; "
-            "free some, choose another folder (train.cache), or a larger stride (train.stride)"
-        )
-
-
-def _decode(dataset: Dataset, stride: int, count: int, folder: Path) -> int:
-    identity = dataset.identity
-    samples = identity.horizon // stride
-    shapes = {
+    return {
         "episode": (np.int64, (count,)),
         "x": (np.float32, (count, len(identity.parameters))),
         "xi": (np.float32, (count, len(identity.observation), samples)),
@@ -108,26 +129,26 @@ def _decode(dataset: Dataset, stride: int, count: int, folder: Path) -> int:
         "y": (np.float32, (count,)),
         "f": (np.float32, (count,)),
     }
+
+
+def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None:
     arrays = {
         name: np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=kind, shape=shape)
-        for name, (kind, shape) in shapes.items()
+        for name, (kind, shape) in layout.items()
     }
     filled = 0
     for _, columns in dataset.batches():
-        rows = _sampled(columns, stride, samples)
+        rows = _sampled(columns, stride, dataset.identity.horizon // stride)
         size = len(rows["episode"])
         for name, values in rows.items():
             arrays[name][filled : filled + size] = values
         filled += size
-    for name, array in arrays.items():
+    for array in arrays.values():
         array.flush()
-        if filled < count:
-            np.save(folder / f"{name}.npy", array[:filled].copy())
-    return filled
 
 
 def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
-    sane = np.array([stop != "diverged" for stop in columns.stop])
+    sane = np.array([stop == "" for stop in columns.stop])
     last = slice(stride - 1, samples * stride, stride)
     return {
         "episode": columns.episode[sane],

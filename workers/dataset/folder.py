@@ -8,7 +8,8 @@ from pathlib import Path
 
 from workers.dataset import shards
 from workers.dataset.identity import Identity
-from workers.dataset.schema import Columns, read
+from workers.dataset.publication import link, synchronise, temporary_file
+from workers.dataset.schema import Columns, read, read_stops
 from workers.dataset.shards import Shard
 
 MANIFEST = "dataset.json"
@@ -32,6 +33,10 @@ class Dataset:
     def episodes(self) -> int:
         """How many episodes the finished shards hold."""
         return sum(shard.episodes for shard in self.shards())
+
+    def sane_episodes(self) -> int:
+        """How many of them ran to their end; the rest diverged."""
+        return sum(read_stops(self.path(shard)).count("") for shard in self.shards())
 
     def size(self) -> int:
         """Bytes of the finished shards."""
@@ -67,9 +72,10 @@ def create(folder: Path, identity: Identity) -> Dataset:
     folder.mkdir(parents=True, exist_ok=True)
     manifest = folder / MANIFEST
     if not manifest.exists():
-        temporary = folder / f".{MANIFEST}.{shards.writer()}"
-        temporary.write_text(json.dumps(json.loads(identity.to_json()), indent=2) + "\n")
-        temporary.replace(manifest)
+        with temporary_file(folder, MANIFEST) as temporary:
+            temporary.write_text(json.dumps(json.loads(identity.to_json()), indent=2) + "\n")
+            synchronise(temporary)
+            link(temporary, manifest)
     dataset = open_dataset(folder)
     differences = dataset.identity.differences(identity)
     if differences:
@@ -92,5 +98,5 @@ def open_dataset(folder: Path) -> Dataset:
         raise ValueError(f"{folder} holds no dataset: there is no {MANIFEST} in it")
     try:
         return Dataset(folder, Identity.from_json(manifest.read_text()))
-    except (TypeError, KeyError, json.JSONDecodeError) as error:
+    except ValueError as error:
         raise ValueError(f"{manifest} is damaged or of another version: {error}") from error

@@ -63,18 +63,29 @@ class Identity:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The identity that `to_json` wrote."""
+        """The identity that `to_json` wrote.
+
+        Raises:
+            ValueError: when the text is not JSON, or not that of an identity.
+        """
         values: dict[str, Any] = json.loads(text)
-        for name in ("parameters", "observation"):
-            values[name] = tuple(tuple(row) for row in values[name])
-        values["conditions"] = tuple(values["conditions"])
-        values["physics"] = {name: tuple(interval) for name, interval in values["physics"].items()}
-        return cls(**values)
+        try:
+            for name in ("parameters", "observation"):
+                values[name] = tuple(tuple(row) for row in values[name])
+            values["conditions"] = tuple(values["conditions"])
+            values["physics"] = {name: tuple(interval) for name, interval in values["physics"].items()}
+            return cls(**values)
+        except (TypeError, KeyError, AttributeError) as error:
+            raise ValueError(f"no identity of a dataset: {error!r}") from error
 
     def differences(self, other: "Identity") -> tuple[str, ...]:
         """One line for every field in which two identities differ."""
-        pairs = ((field.name, getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
-        return tuple(f"{name}: {_brief(mine)} and {_brief(theirs)}" for name, mine, theirs in pairs if mine != theirs)
+        pairs = (
+            (field.name, getattr(self, field.name), getattr(other, field.name)) for field in fields(self)
+        )
+        return tuple(
+            f"{name}: {_brief(mine)} and {_brief(theirs)}" for name, mine, theirs in pairs if mine != theirs
+        )
 
 
 def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int) -> Identity:

@@ -1,15 +1,17 @@
 """The Parquet columns: one row per episode, in a file that explains itself."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from jaxtyping import Float32, Int64, UInt8
+from jaxtyping import Float32, Float64, Int64, UInt8
 
 from workers.dataset.identity import Identity
 from workers.rollout import Episode
@@ -30,6 +32,7 @@ class Columns:
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
+        physics: the parameters each ran under, by name.
     """
 
     episode: Int64[np.ndarray, " n"]
@@ -39,12 +42,13 @@ class Columns:
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
     stop: tuple[str, ...]
+    physics: Mapping[str, Float64[np.ndarray, " n"]]
 
 
 def schema(identity: Identity) -> pa.Schema:
     """Columns and metadata of every file of a dataset."""
     size = len(identity.observation) * identity.horizon
-    physics = pa.struct([pa.field(name, pa.float64(), nullable=False) for name in identity.physics])
+    physics = pa.struct([pa.field(name, pa.float64(), nullable=False) for name in sorted(identity.physics)])
     metadata = {
         "svaedc.identity": identity.to_json(),
         "svaedc.digest": identity.digest,
@@ -66,21 +70,24 @@ def schema(identity: Identity) -> pa.Schema:
         "stop": pa.dictionary(pa.int8(), pa.string()),
         "physics": physics,
     }
-    return pa.schema([pa.field(name, kind, nullable=False) for name, kind in columns.items()], metadata=metadata)
+    return pa.schema(
+        [pa.field(name, kind, nullable=False) for name, kind in columns.items()], metadata=metadata
+    )
 
 
 def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode]) -> None:
-    """Write consecutive episodes, the first with index `start`: zstd over byte streams split by significance."""
+    """Write consecutive episodes, the first with index `start`: zstd over byte streams, split by place."""
     layout = schema(identity)
+    kinds = {field.name: field.type for field in layout}
     arrays = {
         "episode": pa.array(np.arange(start, start + len(episodes))),
-        "x": _lists([episode.x for episode in episodes], layout.field("x").type),
-        "xi": _lists([episode.xi for episode in episodes], layout.field("xi").type),
-        "bad": _lists([episode.bad for episode in episodes], layout.field("bad").type),
-        "y": pa.array(np.array([episode.y for episode in episodes], dtype=np.float32)),
-        "f": pa.array(np.array([episode.f for episode in episodes], dtype=np.float32)),
-        "stop": pa.array([episode.stop for episode in episodes]).dictionary_encode().cast(layout.field("stop").type),
-        "physics": pa.array([dict(episode.physics) for episode in episodes], type=layout.field("physics").type),
+        "x": _lists([episode.x for episode in episodes], kinds["x"]),
+        "xi": _lists([episode.xi for episode in episodes], kinds["xi"]),
+        "bad": _lists([episode.bad for episode in episodes], kinds["bad"]),
+        "y": pa.array([episode.y for episode in episodes], type=kinds["y"]),
+        "f": pa.array([episode.f for episode in episodes], type=kinds["f"]),
+        "stop": pa.array([episode.stop for episode in episodes]).dictionary_encode().cast(kinds["stop"]),
+        "physics": pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"]),
     }
     pq.write_table(
         pa.table(arrays, schema=layout),
@@ -90,6 +97,7 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         compression_level=1,
         use_dictionary=["stop"],
         use_byte_stream_split=_SPLIT,
+        write_page_checksum=True,
     )
 
 
@@ -104,27 +112,21 @@ def read_identity(path: Path) -> Identity:
     Raises:
         ValueError: when the file is no Parquet file of this project.
     """
-    try:
+    with _damage_named(path):
         metadata = pq.read_schema(path).metadata or {}
-    except (pa.ArrowInvalid, OSError) as error:
-        raise ValueError(f"{path} is not a readable Parquet file: {error}") from error
     if b"svaedc.identity" not in metadata:
-        raise ValueError(f"{path} does not hold episodes of this project: no svaedc.identity in its metadata")
+        raise ValueError(f"{path} holds no episodes of this project: its metadata lacks svaedc.identity")
     return Identity.from_json(metadata[b"svaedc.identity"].decode())
 
 
-def read(path: Path, identity: Identity, *, row_groups: Sequence[int] | None = None) -> Columns:
-    """The episodes of a file, or of some of its row groups.
+def read(path: Path, identity: Identity) -> Columns:
+    """The episodes of a file, every page checked against its checksum.
 
     Raises:
         ValueError: when the file is damaged or not of this schema.
     """
-    try:
-        file = pq.ParquetFile(path)
-        groups = range(file.num_row_groups) if row_groups is None else row_groups
-        table = file.read_row_groups(list(groups))
-    except (pa.ArrowInvalid, OSError) as error:
-        raise ValueError(f"{path} is damaged: {error}") from error
+    with _damage_named(path):
+        table = pq.ParquetFile(path, page_checksum_verification=True).read()
     if not table.schema.equals(schema(identity)):
         raise ValueError(f"{path} has other columns than schema version {identity.schema_version}")
     shape = (len(identity.observation), identity.horizon)
@@ -136,15 +138,27 @@ def read(path: Path, identity: Identity, *, row_groups: Sequence[int] | None = N
         y=table["y"].to_numpy(),
         f=table["f"].to_numpy(),
         stop=tuple(table["stop"].to_pylist()),
+        physics={name: pc.struct_field(table["physics"], name).to_numpy() for name in identity.physics},
     )
 
 
-def row_groups(path: Path) -> int:
-    """How many row groups a file has."""
-    return pq.ParquetFile(path).num_row_groups
+def read_stops(path: Path) -> tuple[str, ...]:
+    """The stop reasons of a file's episodes, without reading the rest.
+
+    Raises:
+        ValueError: when the file is damaged.
+    """
+    with _damage_named(path):
+        return tuple(pq.read_table(path, columns=["stop"])["stop"].to_pylist())
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        raise ValueError(f"{path} is damaged or no Parquet file: {error}") from error
 
 
 def _dense(column: pa.ChunkedArray, shape: tuple[int, ...]) -> Any:
-    flat = column.combine_chunks()
-    values = flat.flatten() if isinstance(flat, pa.FixedSizeListArray) else pa.concat_arrays(flat.chunks).flatten()
-    return values.to_numpy().reshape(len(column), *shape)
+    return pc.list_flatten(column).to_numpy().reshape(len(column), *shape)

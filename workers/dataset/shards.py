@@ -1,15 +1,12 @@
 """Shards: which files a dataset consists of, and how one of them comes to be, once and whole."""
 
 import hashlib
-import os
 import re
-import socket
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-WRITING = ".writing"
-"""Folder, below the dataset, of files that are not finished."""
+from workers.dataset.publication import WRITING, is_dead, link, synchronise, temporary_file
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")
 _BLOCK = 1 << 20
@@ -45,7 +42,7 @@ def present(folder: Path) -> list[Shard]:
 
 
 def missing(shards: Iterable[Shard], episodes: int, per_shard: int) -> Iterator[Shard]:
-    """The shards still to be written for `episodes` episodes; a partial file is completed by a further one."""
+    """The shards still to be written for `episodes` episodes; a further file completes a partial one."""
     done = sorted(shards)
     covered = 0
     position = 0
@@ -72,17 +69,11 @@ def commit(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Path:
         shard: what is written.
         write: writes the file at the path it is given.
     """
-    writing = folder / WRITING
-    writing.mkdir(exist_ok=True)
-    temporary = writing / f"{shard.name}.{writer()}"
-    try:
+    with temporary_file(folder, shard.name) as temporary:
         write(temporary)
-        _sync(temporary)
+        synchronise(temporary)
         _publish_digest(folder, shard, sha256(temporary))
-        _link(temporary, folder / shard.name)
-    finally:
-        temporary.unlink(missing_ok=True)
-    _sync(folder)
+        link(temporary, folder / shard.name)
     return folder / shard.name
 
 
@@ -94,7 +85,8 @@ def digest_path(folder: Path, shard: Shard) -> Path:
 def recorded_digest(folder: Path, shard: Shard) -> str:
     """The SHA-256 written beside a shard; "" when there is none."""
     path = digest_path(folder, shard)
-    return path.read_text().split()[0] if path.exists() and path.stat().st_size else ""
+    words = path.read_text(errors="replace").split() if path.exists() else []
+    return words[0] if words else ""
 
 
 def sha256(path: Path) -> str:
@@ -106,62 +98,20 @@ def sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def writer() -> str:
-    """Names this process among all processes of all machines: host, boot and process id."""
-    return f"{socket.gethostname().replace('.', '_')}.{_boot()}.{os.getpid()}"
-
-
 def sweep(folder: Path) -> int:
     """Remove unfinished files whose writer is known to be dead; returns how many."""
     writing = folder / WRITING
-    dead = [path for path in writing.iterdir() if _dead(path.name)] if writing.exists() else []
+    dead = [path for path in writing.iterdir() if is_dead(path.name)] if writing.exists() else []
     for path in dead:
         path.unlink(missing_ok=True)
     return len(dead)
 
 
-def _dead(name: str) -> bool:
-    host, boot, pid = name.rsplit(".", 3)[1:]
-    if host != socket.gethostname().replace(".", "_"):
-        return False  # nobody here can tell
-    return boot != _boot() or not _alive(int(pid))
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def _boot() -> str:
-    path = Path("/proc/sys/kernel/random/boot_id")
-    return path.read_text().strip() if path.exists() else "boot"
-
-
 def _publish_digest(folder: Path, shard: Shard, digest: str) -> None:
-    temporary = folder / WRITING / f"{shard.name}.sha256.{writer()}"
-    temporary.write_text(f"{digest}  {shard.name}\n")
-    _sync(temporary)
-    if (folder / shard.name).exists():
-        temporary.unlink()  # another writer was first: its file and digest stand
-    else:
-        temporary.replace(digest_path(folder, shard))
-
-
-def _link(source: Path, target: Path) -> None:
-    try:
-        os.link(source, target)
-    except FileExistsError:
-        pass
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    """Before the shard itself, so that no shard is without one; a shard already there keeps its own."""
+    target = digest_path(folder, shard)
+    with temporary_file(folder, target.name) as temporary:
+        temporary.write_text(f"{digest}  {shard.name}\n")
+        synchronise(temporary)
+        if not (folder / shard.name).exists():
+            temporary.replace(target)

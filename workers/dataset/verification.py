@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from workers.dataset import shards
 from workers.dataset.folder import Dataset
+from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns, read_identity
 from workers.dataset.shards import Shard
+from workers.physics import PhysicsRanges
 from workers.randomness import generator
 
 
@@ -24,18 +27,18 @@ def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Problem]]]:
     """Check every shard in turn, and yield it with what is wrong with it; nothing is changed or deleted."""
     reached = 0
     for shard in dataset.shards():
-        problems = [] if shard.start >= reached else [Problem(shard.name, f"overlaps episodes below {reached}")]
-        if shard.start > reached:
-            problems.append(Problem(shard.name, f"episodes {reached} to {shard.start - 1} before it are missing"))
+        found = chain(
+            _range_problems(shard, reached), _byte_problems(dataset, shard), _row_problems(dataset, shard)
+        )
+        yield shard, [Problem(shard.name, what) for what in found]
         reached = max(reached, shard.stop)
-        yield shard, problems + _file_problems(dataset, shard)
 
 
-def _file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
-    try:
-        return [Problem(shard.name, what) for what in (*_byte_problems(dataset, shard), *_row_problems(dataset, shard))]
-    except ValueError as error:
-        return [Problem(shard.name, str(error))]
+def _range_problems(shard: Shard, reached: int) -> Iterator[str]:
+    if shard.start < reached:
+        yield f"it overlaps: episodes below {reached} are in files before it"
+    if shard.start > reached:
+        yield f"episodes {reached} to {shard.start - 1} before it are missing"
 
 
 def _byte_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
@@ -47,23 +50,37 @@ def _byte_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
 
 
 def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
-    differences = dataset.identity.differences(read_identity(dataset.path(shard)))
-    if differences:
-        yield f"it belongs to another dataset: {'; '.join(differences)}"
+    try:
+        differences = dataset.identity.differences(read_identity(dataset.path(shard)))
+        if differences:
+            yield f"it belongs to another dataset: {'; '.join(differences)}"
+            return
+        columns = dataset.read(shard)
+    except ValueError as error:
+        yield str(error)
         return
-    columns = dataset.read(shard)
-    if not np.array_equal(columns.episode, np.arange(shard.start, shard.stop)):
+    if np.array_equal(columns.episode, np.arange(shard.start, shard.stop)):
+        yield from _content_problems(columns, dataset.identity)
+    else:
         yield f"its rows are not the episodes {shard.start} to {shard.stop - 1}"
-        return
-    yield from _content_problems(columns, dataset.identity.seed)
 
 
-def _content_problems(columns: Columns, seed: int) -> Iterator[str]:
+def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     if not all(np.isfinite(values).all() for values in (columns.x, columns.xi, columns.y, columns.f)):
         yield "it holds numbers that are not finite"
     if not np.allclose(columns.y, (columns.bad != 0).mean(axis=1), atol=1e-6):
         yield "y is not the mean of the bad steps"
+    controllers = (generator(identity.seed, "controller", int(index)) for index in columns.episode)
     width = columns.x.shape[1]
-    drawn = (generator(seed, "controller", int(index)).random(width, dtype=np.float32) for index in columns.episode)
-    if not all(np.array_equal(x, expected) for x, expected in zip(columns.x, drawn, strict=True)):
-        yield f"its controllers are not those of seed {seed}"
+    if not all(
+        np.array_equal(x, rng.random(width, dtype=np.float32))
+        for x, rng in zip(columns.x, controllers, strict=True)
+    ):
+        yield f"its controllers are not those of seed {identity.seed}"
+    ranges = PhysicsRanges(identity.physics)
+    draws = (ranges.draw(generator(identity.seed, "physics", int(index))) for index in columns.episode)
+    if not all(
+        draw == {name: values[row] for name, values in columns.physics.items()}
+        for row, draw in enumerate(draws)
+    ):
+        yield f"its physics are not those of seed {identity.seed}"

@@ -1,1 +1,1 @@
-"""Robots and the things around them: what is observed, what is commanded, and where every number comes from."""
+"""Robots and the things around them: what is observed, what is commanded, what every number is."""

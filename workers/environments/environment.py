@@ -24,7 +24,9 @@ class Channel:
     def __post_init__(self) -> None:
         """Refuse empty bounds."""
         if not self.low < self.high:
-            raise ValueError(f"bounds of channel {self.name} must satisfy low < high, got [{self.low}, {self.high}]")
+            raise ValueError(
+                f"bounds of channel {self.name} must satisfy low < high, got [{self.low}, {self.high}]"
+            )
 
 
 @dataclass(frozen=True)

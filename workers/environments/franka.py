@@ -1,7 +1,7 @@
 """Franka Emika pushing two wooden rolls with joint torques: the setup `franka`.
 
-The robot is the `panda.urdf` that ships with PyBullet, with the true arm's joint limits, 1 N·m·s/rad of joint damping,
-and fingers that touch nothing. There is no limit on joint speed, as in the paper's simulation.
+The robot is the `panda.urdf` that ships with PyBullet, with the true arm's joint limits, 1 N·m·s/rad of joint
+damping, and fingers that touch nothing. There is no limit on joint speed, as in the paper's simulation.
 """
 
 from functools import partial
@@ -54,7 +54,9 @@ WAYPOINTS = WaypointRanges(
 def setup() -> Setup:
     """The setup `franka`: 48-D, 500 steps of 2 ms, f in [-1.8, 1.2] m."""
     nominal = MODEL.nominal_physics()
-    paper = {name: interval for name, interval in around(nominal, 0.05).intervals.items() if "rolling" not in name}
+    paper = {
+        name: interval for name, interval in around(nominal, 0.05).intervals.items() if "rolling" not in name
+    }
     fixed = {name: (value, value) for name, value in nominal.items() if "rolling" in name}
     task = StablePush(
         starts=STARTS,

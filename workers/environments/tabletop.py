@@ -135,7 +135,7 @@ class Tabletop(Environment):
 
 
 def first_two_axes(quaternion: Float[np.ndarray, "time 4"]) -> Float[np.ndarray, "6 time"]:
-    """The first two columns of the rotation matrices of quaternions (x, y, z, w): a continuous orientation."""
+    """First two columns of the rotation matrices of quaternions (x, y, z, w): a continuous orientation."""
     x, y, z, w = quaternion.T
     return np.stack(
         [

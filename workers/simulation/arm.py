@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import pybullet
 import pybullet_data
@@ -11,10 +12,12 @@ from workers.simulation.world import World
 
 Vector = tuple[float, ...]
 
+_ORIGIN = (0.0, 0.0, 0.0)
+_LINK, _DISTANCE = 3, 8  # in a contact point of PyBullet: the first body's link, and the gap in m
 
-@dataclass(frozen=True, slots=True)
-class ArmState:
-    """One reading of an arm.
+
+class ArmState(NamedTuple):
+    """One reading of an arm; a tuple, for one is built in every step.
 
     Attributes:
         joints: angles in rad.
@@ -39,7 +42,7 @@ class ArmModel:
 
     Attributes:
         urdf: path below the folder of robots that ships with PyBullet, or an absolute path.
-        joints: names of the joints that move, base to tip; names and limits refuse what the URDF does not hold.
+        joints: names of the joints that move, base to tip.
         lower: lower joint limits in rad.
         upper: upper joint limits in rad.
         home: joint angles at reset in rad.
@@ -63,9 +66,8 @@ class ArmModel:
         """Refuse limits and home poses that do not fit the joints."""
         for name in ("lower", "upper", "home"):
             if len(getattr(self, name)) != len(self.joints):
-                raise ValueError(
-                    f"{name} must hold one angle per joint ({len(self.joints)}), got {len(getattr(self, name))}"
-                )
+                count = len(getattr(self, name))
+                raise ValueError(f"{name} must hold one angle per joint ({len(self.joints)}), got {count}")
         for joint, low, start, high in zip(self.joints, self.lower, self.home, self.upper, strict=True):
             if not low <= start <= high:
                 raise ValueError(f"home of {joint} must lie within [{low}, {high}] rad, got {start}")
@@ -86,7 +88,7 @@ class Arm:
         self._joints = [index[name] for name in model.joints]
         self._fingers = [index[name] for name in model.fingers]
         self._hand = index[model.hand]
-        self._rest = [0.0] * (len(self._joints) + len(self._fingers))
+        self._rest = (0.0,) * (len(self._joints) + len(self._fingers))
         self._finger_rest = (0.0,) * len(self._fingers)
         self._configure()
         self.state = self._read()
@@ -152,40 +154,48 @@ class Arm:
 
     def _read(self) -> ArmState:
         joints = pybullet.getJointStates(self.body, self._joints, physicsClientId=self._client)
-        link = pybullet.getLinkState(
-            self.body, self._hand, 1, 1, physicsClientId=self._client
-        )  # without forward kinematics Bullet answers with the poses of one step before
-        (vx, vy, vz), (wx, wy, wz) = link[6], link[7]  # of the centre of mass
-        dx, dy, dz = (frame - com for frame, com in zip(link[4], link[0], strict=True))
-        return ArmState(
-            tuple(joint[0] for joint in joints),
-            tuple(joint[1] for joint in joints),
-            link[4],
-            link[5],
-            (vx + wy * dz - wz * dy, vy + wz * dx - wx * dz, vz + wx * dy - wy * dx),
-            link[7],
+        # Without forward kinematics Bullet answers with the poses of one step before.
+        centre, _, _, _, origin, orientation, velocity, spin = pybullet.getLinkState(
+            self.body,
+            self._hand,
+            computeLinkVelocity=1,
+            computeForwardKinematics=1,
+            physicsClientId=self._client,
         )
+        angles, speeds, _, _ = zip(*joints, strict=True)
+        return ArmState(angles, speeds, origin, orientation, _carried(velocity, spin, centre, origin), spin)
 
     def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
         """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
-        angles = (*self.state.joints, *self._finger_rest)
         return pybullet.calculateJacobian(
-            self.body, self._hand, (0.0, 0.0, 0.0), angles, self._rest, self._rest, physicsClientId=self._client
+            self.body,
+            self._hand,
+            _ORIGIN,
+            self.state.joints + self._finger_rest,
+            self._rest,
+            self._rest,
+            physicsClientId=self._client,
         )
 
     def gravity_torque(self) -> Vector:
-        """Torques, in N·m, that hold the arm still against gravity, Coriolis and centrifugal forces."""
+        """Torques, in N·m, against gravity, Coriolis and centrifugal forces; the fingers come last."""
         return pybullet.calculateInverseDynamics(
             self.body,
-            (*self.state.joints, *self._finger_rest),
-            (*self.state.speeds, *self._finger_rest),
+            self.state.joints + self._finger_rest,
+            self.state.speeds + self._finger_rest,
             self._rest,
             physicsClientId=self._client,
         )
 
     def touches(self, body: int) -> bool:
         """Whether any link but the base is in contact with the body."""
-        for contact in pybullet.getContactPoints(self.body, body, physicsClientId=self._client):
-            if contact[3] >= 0 and contact[8] < 0.0:
-                return True
-        return False
+        contacts = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
+        return any(contact[_LINK] >= 0 and contact[_DISTANCE] < 0.0 for contact in contacts)
+
+
+def _carried(velocity: Vector, spin: Vector, centre: Vector, origin: Vector) -> Vector:
+    """Velocity v + ω × (origin − centre) of a link's origin, from that of its centre of mass."""
+    vx, vy, vz = velocity
+    wx, wy, wz = spin
+    dx, dy, dz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
+    return (vx + wy * dz - wz * dy, vy + wz * dx - wx * dz, vz + wx * dy - wy * dx)

@@ -32,7 +32,8 @@ class StablePush(Task):
     margin: float
     channel: int
     conditions: tuple[str, ...] = field(
-        default=("object_tipped", "object_off_table", "hand_outside_workspace", "arm_touches_table"), init=False
+        default=("object_tipped", "object_off_table", "hand_outside_workspace", "arm_touches_table"),
+        init=False,
     )
 
     def __post_init__(self) -> None:
@@ -42,7 +43,7 @@ class StablePush(Task):
 
     @property
     def objective_limits(self) -> tuple[float, float]:
-        """f when every object tips over, and when every object ends upright at the far edge."""
+        """The value of f when every object tips over, and when every one ends upright at the far edge."""
         far = [abs((self.table_y[1] if self.direction > 0 else self.table_y[0]) - y) for _, y in self.starts]
         return -len(self.starts) * (self.table_y[1] - self.table_y[0]), sum(far)
 

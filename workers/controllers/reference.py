@@ -1,0 +1,87 @@
+"""What the hand should do at every control step: minimum-jerk positions, linear orientations, their rates."""
+
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+
+def ends(horizon: int, waypoints: int) -> np.ndarray:
+    """Step at which each waypoint is reached, beginning with 0."""
+    return np.linspace(0, horizon, waypoints + 1).round().astype(int)
+
+
+def reference(
+    corners: Float[np.ndarray, "points 3"], turns: Float[np.ndarray, "points 3"], horizon: int, dt: float
+) -> tuple[np.ndarray, ...]:
+    """Motion through the corners, each after an equal share of the horizon, from rest to rest.
+
+    Returns:
+        Position, velocity, acceleration [horizon, 3], orientation as quaternions (x, y, z, w) [horizon, 4],
+        and angular velocity [horizon, 3] wanted at the end of every step; SI units, in the world.
+    """
+    pieces: list[tuple[np.ndarray, ...]] = []
+    reached = ends(horizon, len(corners) - 1)
+    legs = zip(pairwise(reached), pairwise(corners), pairwise(turns), strict=True)
+    for (begin, end), (a, b), (turn_a, turn_b) in legs:
+        duration = (end - begin) * dt
+        s = (np.arange(1, end - begin + 1) / (end - begin))[:, None]
+        quaternion = quaternions(turn_a + s * (turn_b - turn_a))
+        pieces.append((*minimum_jerk(s, a, b, duration), quaternion))
+    position, velocity, acceleration, quaternion = (
+        np.concatenate(part) for part in zip(*pieces, strict=True)
+    )
+    return position, velocity, acceleration, quaternion, angular_velocity(quaternion, dt)
+
+
+def minimum_jerk(
+    s: Float[np.ndarray, "time 1"], a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], duration: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, velocity, acceleration of the minimum-jerk motion a → b at the fractions s of its duration.
+
+    Fifth-order polynomial with zero velocity and acceleration at both ends: 10 s³ − 15 s⁴ + 6 s⁵.
+    """
+    position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    velocity = (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
+    acceleration = (b - a) * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
+    return position, velocity, acceleration
+
+
+def quaternions(euler: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, "time 4"]:
+    """Quaternions (x, y, z, w) of roll, pitch, yaw about the fixed axes."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(euler / 2).T, np.sin(euler / 2).T
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=1,
+    )
+
+
+def euler_angles(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
+    """Roll, pitch, yaw about the fixed axes of a quaternion (x, y, z, w)."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+            np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
+            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+        ]
+    )
+
+
+def angular_velocity(quaternion: Float[np.ndarray, "time 4"], dt: float) -> Float[np.ndarray, "time 3"]:
+    """Angular velocity, in the world, of a sequence of orientations: 2 q̇ q*."""
+    change = np.gradient(quaternion, dt, axis=0)
+    (x, y, z, w), (dx, dy, dz, dw) = quaternion.T, change.T
+    return 2 * np.stack(
+        [
+            -dw * x + dx * w - dy * z + dz * y,
+            -dw * y + dx * z + dy * w - dz * x,
+            -dw * z - dx * y + dy * x + dz * w,
+        ],
+        axis=1,
+    )

@@ -1,0 +1,76 @@
+"""How a file comes to be, once and whole: written under its writer's name, then linked to its own."""
+
+import os
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+WRITING = ".writing"
+"""Folder, below the dataset, of files that are not finished."""
+
+_WRITER = re.compile(r".*\.(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)")
+
+
+@contextmanager
+def temporary_file(folder: Path, name: str) -> Iterator[Path]:
+    """A path for a file of this writer that is not finished; whatever lies there is removed at the end."""
+    writing = folder / WRITING
+    writing.mkdir(exist_ok=True)
+    temporary = writing / f"{name}.{writer()}"
+    try:
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def link(source: Path, target: Path) -> None:
+    """Give a finished file its final name, durably, unless another writer was first."""
+    with suppress(FileExistsError):
+        os.link(source, target)
+    synchronise(target.parent)
+
+
+def synchronise(path: Path) -> None:
+    """Wait until a file's bytes, or a folder's names, are on disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def writer() -> str:
+    """The suffix of this process's temporary files: host, boot and process id."""
+    return f"{_host()}.{_boot()}.{os.getpid()}"
+
+
+def is_dead(name: str) -> bool:
+    """Whether the file's name says that its writer is a process of this machine that lives no longer.
+
+    False for writers on other machines and for names without a writer: nobody here can tell.
+    """
+    match = _WRITER.fullmatch(name)
+    if match is None or match["host"] != _host():
+        return False
+    return match["boot"] != _boot() or not _alive(int(match["pid"]))
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _host() -> str:
+    return socket.gethostname().replace(".", "_")
+
+
+def _boot() -> str:
+    path = Path("/proc/sys/kernel/random/boot_id")
+    return path.read_text().strip() if path.exists() else "boot"
