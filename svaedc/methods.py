@@ -88,7 +88,9 @@ class BotorchDefault:
             return UniformSearch(self.dimensions).suggest(history, rng)
         with bo.torch_randomness(rng):
             best = bo.maximise_log_ei(torch.tensor(history.x), torch.tensor(history.f))
-        return best.numpy().astype(np.float32)
+        x = best.numpy().astype(np.float32)
+        # The process learns nothing from a failed trial and would ask for the same one for ever.
+        return UniformSearch(self.dimensions).suggest(history, rng) if history.has_failed(x) else x
 
 
 KernelOf = Callable[[int], Kernel]

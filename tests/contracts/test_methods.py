@@ -69,6 +69,14 @@ def test_suggestions_are_all_different(name):
         grown = grown.append(x, 0.2)
 
 
+@pytest.mark.parametrize("name", [*ON_POOL, "botorch"])
+def test_controller_that_failed_is_not_suggested_again(name):
+    method, grown = built(name), history(3)
+    failed = method.suggest(grown, np.random.default_rng(0))
+    again = method.suggest(grown.append(failed, float("nan")), np.random.default_rng(0))
+    assert not np.array_equal(again, failed)
+
+
 @pytest.mark.parametrize("name", ON_POOL)
 def test_method_on_a_pool_suggests_its_controllers_bit_for_bit(name):
     given = problem(DIMENSIONS, CANDIDATES, seed=3)

@@ -66,14 +66,6 @@ def test_compression_spends_fewer_trials_on_controllers_predicted_bad():
     assert mean_badness("svae-dc") < mean_badness("random") - 0.1
 
 
-def test_controller_that_failed_is_not_suggested_again():
-    method = methods.build("se", problem(2, 50, 0))
-    history = History.empty(2).append(np.full(2, 0.5, dtype=np.float32), 0.3)
-    first = method.suggest(history, np.random.default_rng(0))
-    second = method.suggest(history.append(first, float("nan")), np.random.default_rng(0))
-    assert not np.array_equal(first, second)
-
-
 def test_search_off_the_pool_needs_neither_model_nor_pool():
     bare = Problem(30, (0.0, 13.0), np.empty((0, 30), dtype=np.float32))
     history = History.empty(30)
