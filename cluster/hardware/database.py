@@ -37,6 +37,8 @@ class JournalCorrupt(JournalError):  # noqa: N818 - names the state of the file
 def connected(path: Path) -> sqlite3.Connection:
     """A connection for which a commit is on disk when it returns (WAL, `synchronous=FULL`)."""
     connection = sqlite3.connect(path, timeout=BUSY_SECONDS, isolation_level=None)
+    # SQLite's own decoder reports damaged text like a full disk; this one raises UnicodeDecodeError.
+    connection.text_factory = bytes.decode
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")
     return connection

@@ -167,13 +167,12 @@ class Journal:
         return broken
 
     def _campaign(self) -> tuple[str, Identity]:
-        row = self._connection.execute(
-            "SELECT name, robot, setup, method, seed, model, pool, trials, approval FROM campaign"
-        ).fetchone()
-        if row is None:
-            raise corrupt(self.path, "it names no campaign")
-        name, robot, setup, method, seed, model, pool, trials, approval = row
+        query = "SELECT name, robot, setup, method, seed, model, pool, trials, approval FROM campaign"
         try:
+            row = self._connection.execute(query).fetchone()
+            if row is None:
+                raise corrupt(self.path, "it names no campaign")
+            name, robot, setup, method, seed, model, pool, trials, approval = row
             return name, Identity(robot, setup, method, seed, model, pool, trials, Approval(approval))
         except ValueError as error:
             raise corrupt(self.path, str(error)) from error

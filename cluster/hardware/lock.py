@@ -7,7 +7,6 @@ import socket
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Self
 
 from cluster.errors import UserError
 
@@ -35,7 +34,7 @@ class Process:
     pid: int
 
     @classmethod
-    def own(cls) -> Self:
+    def own(cls) -> "Process":
         """The process that asks."""
         boot = BOOT_ID.read_text().strip() if BOOT_ID.exists() else ""
         return cls(socket.gethostname(), boot, os.getpid())
@@ -74,7 +73,7 @@ class FolderLock:
         """Lets another process in."""
         self._file.close()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "FolderLock":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -3,7 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -57,6 +57,7 @@ class Motion:
     measurement: Measurement | None
 
 
+@runtime_checkable
 class RobotDriver(Protocol):
     """A robot that runs one controller at a time.
 
