@@ -63,7 +63,11 @@ class TrainSettings(Section):
     """`svaedc train`: where and for how long; what is trained is the preset's business."""
 
     workers: PositiveInt = 1
-    """Data-parallel training processes, one CPU each; one further CPU must stay free for Ray Train."""
+    """Data-parallel training processes."""
+    threads: PositiveInt | Literal["all"] = "all"
+    """Of each process, one CPU each; `all` shares the CPUs of the cluster among the processes."""
+    updates: PositiveInt | Literal["preset"] = "preset"
+    """Gradient updates of each stage; fewer train faster and worse."""
     stride: PositiveInt = 5
     """Every how many control steps the model sees one."""
     time_limit_seconds: PositiveFloat = inf
@@ -72,6 +76,10 @@ class TrainSettings(Section):
     """Where shards are decoded into one memory-mapped array, once per dataset."""
     checkpoint_every_epochs: PositiveInt = 1
     """Epochs that an interruption may cost."""
+
+    def thread_count(self, cpus: int) -> int:
+        """Threads of each training process on a cluster with this many CPUs, at least one."""
+        return max(1, cpus // self.workers) if self.threads == "all" else self.threads
 
 
 class CompareSettings(Section):
@@ -88,8 +96,8 @@ class CompareSettings(Section):
 class HardwareSettings(Section):
     """`svaedc hardware`: campaigns on the one robot."""
 
-    folder: UserPath = Path("campaigns")
-    """Where the journals are, one SQLite file per campaign; on a local disk of the robot's machine."""
+    pool_size: PositiveInt = 5000
+    """Candidate controllers drawn for a campaign; part of its identity."""
     namespace: str = Field(default="svaedc", min_length=1)
     """Ray namespace of the one hardware actor; the same for everybody who shares the robot."""
 

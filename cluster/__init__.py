@@ -1,0 +1,1 @@
+"""The shell: command line, Ray drivers, hardware journal and tracking; it computes nothing itself."""

@@ -1,0 +1,5 @@
+"""`python -m cluster` is `svaedc`."""
+
+from cluster.cli import main
+
+main()

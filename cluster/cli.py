@@ -1,0 +1,205 @@
+"""The command line `svaedc`: the same on a laptop, against a cluster, and under `ray job submit`."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cluster.config import Settings
+from cluster.errors import UserError
+from cluster.options import (
+    Address,
+    Config,
+    DatasetFolder,
+    ModelFolder,
+    Overrides,
+    Seed,
+    SetupName,
+    settings_of,
+    setup_of,
+)
+from cluster.progress import say
+
+if TYPE_CHECKING:
+    from cluster.session import Session
+    from cluster.tracking import Tracker
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="svaedc",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
+    "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
+    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`. "
+    "Every long command may be interrupted and started again: it goes on where it was.",
+)
+
+
+@contextmanager
+def _services(settings: Settings, address: str | None) -> Iterator[tuple["Session", "Tracker"]]:
+    """The tracker, whose store must exist before anything else starts, and the Ray session."""
+    from cluster.session import connect
+    from cluster.tracking import open_tracker
+
+    tracker = open_tracker(settings.tracking)
+    with connect(settings.ray, address) as session:
+        yield session, tracker
+
+
+@app.command()
+def demo(
+    folder: Annotated[Path, typer.Option("--folder", help="Where everything goes.")] = Path("svaedc-demo"),
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+) -> None:
+    """The main job, small and real: collect, train and compare on the Franka push, in a few minutes."""
+    from cluster.demo import demo as run_demo
+
+    folder.mkdir(parents=True, exist_ok=True)
+    store = f"tracking.uri=sqlite:///{folder.resolve() / 'mlflow.db'}"
+    settings = settings_of(config, [store, *(overrides or [])])
+    with _services(settings, address) as (session, tracker):
+        run_demo(folder.resolve(), settings, session, tracker)
+
+
+@app.command()
+def collect(
+    setup: SetupName,
+    dataset: DatasetFolder,
+    episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many the dataset shall hold.")],
+    seed: Seed = 0,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+) -> None:
+    """Roll out random controllers on a pool of Ray actors into Parquet shards.
+
+    What the folder holds already is kept: run the same command again after an interruption, or ask for more
+    episodes to extend the dataset.
+    """
+    from cluster.collect import collect as run_collect
+
+    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    with _services(settings, address) as (session, tracker):
+        run_collect(
+            setup=chosen,
+            episodes=episodes,
+            folder=dataset,
+            seed=seed,
+            settings=settings.collect,
+            session=session,
+            tracker=tracker,
+        )
+
+
+@app.command()
+def train(
+    dataset: DatasetFolder,
+    model: ModelFolder,
+    preset: Annotated[
+        str, typer.Option("--preset", help="compact (two CPU cores, minutes) or paper (a GPU, hours).")
+    ] = "compact",
+    seed: Seed = 0,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+) -> None:
+    """Fit the SVAE-DC to a dataset with Ray Train; the same command goes on after an interruption."""
+    from cluster.train import train as run_train
+
+    settings = settings_of(config, overrides)
+    with _services(settings, address) as (session, tracker):
+        run_train(
+            folder=dataset,
+            model=model,
+            preset=preset,
+            seed=seed,
+            settings=settings.train,
+            session=session,
+            tracker=tracker,
+        )
+
+
+@app.command()
+def compare(
+    setup: SetupName,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the results.")],
+    methods: Annotated[str, typer.Option("--methods", help="Names, separated by commas.")] = (
+        "random,screened-random,se,svae,svae-dc"
+    ),
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Seeds of each method.")] = 50,
+    trials: Annotated[
+        int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
+    ] = 20,
+    gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
+    model: Annotated[Path | None, typer.Option("--model", help="Folder of a trained model.")] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+) -> None:
+    """Run methods of Bayesian optimisation side by side in simulation, in parallel on Ray Tune.
+
+    All methods of a seed share their random trials and the hidden physics. Report seeds below 1000; tune with
+    --seed 1000 and above. Writes trials.parquet, summary.json, figure.png and figure.svg.
+    """
+    from cluster.compare import Grid
+    from cluster.compare import compare as run_compare
+
+    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    names = tuple(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
+    with _services(settings, address) as (session, tracker):
+        run_compare(
+            setup=chosen,
+            grid=Grid(names, seed, runs),
+            trials=trials,
+            gap=gap,
+            model=model,
+            folder=out,
+            settings=settings.compare,
+            session=session,
+            tracker=tracker,
+        )
+
+
+@app.command()
+def ui(
+    port: Annotated[int, typer.Option("--port", min=1, max=65535, help="On 127.0.0.1.")] = 5000,
+    config: Config = None,
+    overrides: Overrides = None,
+) -> None:
+    """Show every run in a browser: serves MLflow on this machine only."""
+    from cluster.ui import serve_ui
+
+    serve_ui(settings_of(config, overrides).tracking, port, lambda url: say(f"open {url}  (Ctrl-C ends it)"))
+
+
+def _add_groups() -> None:
+    from cluster.dataset_commands import app as dataset_app
+    from cluster.hardware.commands import app as hardware_app
+
+    app.add_typer(dataset_app, name="dataset")
+    app.add_typer(hardware_app, name="hardware")
+
+
+_add_groups()
+
+
+def main() -> None:
+    """Run a command; a user's mistake becomes one line and an exit code, never a traceback."""
+    try:
+        app()
+    except UserError as error:
+        say(f"error: {error}")
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        say("interrupted: everything finished is kept, the same command goes on from here")
+        sys.exit(INTERRUPTED)

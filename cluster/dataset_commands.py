@@ -1,0 +1,96 @@
+"""`svaedc dataset`: what is in a dataset, and whether it is whole."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cluster.errors import UserError
+from cluster.progress import ProgressLine
+from cluster.quarantine import quarantined
+from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.verification import verify
+
+app = typer.Typer(no_args_is_help=True, help="Look into a dataset, or prove that it is whole.")
+
+Folder = Annotated[Path, typer.Argument(help="Folder of the dataset.")]
+
+
+def _opened(folder: Path) -> Dataset:
+    try:
+        return open_dataset(folder)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+@app.command()
+def info(folder: Folder) -> None:
+    """What a dataset is and what its episodes are like."""
+    dataset = _opened(folder)
+    identity = dataset.identity
+    table = Table(show_header=False, box=None)
+    episodes, kilobytes = dataset.episodes(), dataset.size() / 1e3
+    rows = {
+        "setup": identity.setup,
+        "episodes": f"{episodes} in {len(dataset.shards())} shards",
+        "size": f"{kilobytes / 1e3:.1f} MB, {kilobytes / max(episodes, 1):.1f} kB an episode",
+        "each": f"{identity.horizon} steps of {identity.control_step * 1e3:g} ms",
+        "observation": f"{len(identity.observation)} channels",
+        "controller": f"{len(identity.parameters)} parameters",
+        "seed": str(identity.seed),
+        "identity": identity.digest,
+        "fingerprint": dataset.fingerprint(),
+        "made with": f"pybullet {identity.pybullet}, numpy {identity.numpy}",
+        "put aside": ", ".join(quarantined(folder)) or "none",
+    }
+    try:
+        rows |= _statistics(dataset)
+    except ValueError as error:
+        raise UserError(
+            f"{error}; `svaedc dataset verify {folder}` lists everything that is wrong"
+        ) from error
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console().print(table)
+
+
+def _statistics(dataset: Dataset) -> dict[str, str]:
+    f, y, bits, diverged = [], [], [], 0
+    for _, columns in dataset.batches():
+        f.append(columns.f)
+        y.append(columns.y)
+        diverged += sum(stop != "" for stop in columns.stop)
+        bits.append([(columns.bad >> bit & 1).mean() for bit in range(len(dataset.identity.conditions))])
+    if not f:
+        return {}
+    marks = (0, 0.05, 0.25, 0.5, 0.75, 0.95, 1)
+    shares = zip(dataset.identity.conditions, np.mean(bits, axis=0), strict=True)
+    return {
+        "objective": "  ".join(f"{value:+.2f}" for value in np.quantile(np.concatenate(f), marks))
+        + "  (min, 5, 25, 50, 75, 95 %, max)",
+        "badness": f"{np.concatenate(y).mean():.3f} on average",
+        "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in shares),
+        "diverged": str(diverged),
+    }
+
+
+@app.command(name="verify")
+def verify_command(folder: Folder) -> None:
+    """Check every byte and row; exits with 1 and names each broken file. Changes nothing."""
+    dataset = _opened(folder)
+    found = []
+    with ProgressLine("episodes", dataset.episodes(), 0) as progress:
+        for shard, problems in verify(dataset):
+            found += problems
+            progress.advance(shard.episodes, f"{len(found)} problems")
+    for problem in found:
+        typer.echo(f"{problem.file}: {problem.what}")
+    if found:
+        raise UserError(
+            f"{len(found)} problems in {folder}; delete the files named above and their .sha256, and run "
+            "`svaedc collect` again: it recomputes exactly those episodes"
+        )
+    typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")

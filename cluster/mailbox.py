@@ -1,0 +1,62 @@
+"""Messages from Ray workers to the driver, in order, while the driver waits for something else."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import ray
+
+_POLL_SECONDS = 0.5
+
+
+class Mailbox:
+    """Holds messages until the driver takes them."""
+
+    def __init__(self) -> None:
+        self._messages: list[Any] = []
+
+    def put(self, message: Any) -> None:
+        """Add a message."""
+        self._messages.append(message)
+
+    def take(self) -> list[Any]:
+        """All messages since the last call."""
+        messages, self._messages = self._messages, []
+        return messages
+
+
+@contextmanager
+def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
+    """A mailbox whose messages are handed to `receive`, on a thread of the driver, until the block ends.
+
+    An error in `receive` is raised at the end of the block.
+    """
+    actor: Any = ray.remote(Mailbox)
+    box = actor.options(num_cpus=0).remote()
+    ended = threading.Event()
+    errors: list[Exception] = []
+
+    def deliver() -> None:
+        while not ended.wait(_POLL_SECONDS):
+            _take(box, receive, errors)
+
+    thread = threading.Thread(target=deliver, daemon=True)
+    thread.start()
+    try:
+        yield box
+    finally:
+        ended.set()
+        thread.join()
+        _take(box, receive, errors)
+        ray.kill(box)
+    if errors:
+        raise errors[0]
+
+
+def _take(box: Any, receive: Callable[[Any], None], errors: list[Exception]) -> None:
+    try:
+        for message in ray.get(box.take.remote()):
+            receive(message)
+    except Exception as error:  # noqa: BLE001 - crosses a thread; raised where the block ends
+        errors.append(error)

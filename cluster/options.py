@@ -1,0 +1,57 @@
+"""Options that several commands share."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cluster.config import Settings, load_settings
+from cluster.errors import UsageError
+from workers import setups
+from workers.setups import Setup
+
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        help="Settings file; without it, ray_config.yaml in the working directory if there is one.",
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Any setting, over the file; may be repeated."),
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        "--address",
+        metavar="HOST:PORT",
+        help="A running Ray cluster; without it, one is started here for this command.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
+SetupName = Annotated[str, typer.Option("--setup", help="Robot, controller and task, such as franka.")]
+DatasetFolder = Annotated[Path, typer.Option("--dataset", help="Folder of the dataset.")]
+ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.")]
+
+
+def settings_of(config: Path | None, overrides: list[str] | None) -> Settings:
+    """The settings of a command."""
+    return load_settings(config, overrides or [])
+
+
+def setup_of(name: str) -> Setup:
+    """The setup of that name; an unknown one is a usage error."""
+    with usage_errors():
+        return setups.load(name)
+
+
+@contextmanager
+def usage_errors() -> Iterator[None]:
+    """Turns an unknown name into a usage error with the same message."""
+    try:
+        yield
+    except LookupError as error:
+        raise UsageError(error.args[0]) from error

@@ -1,0 +1,96 @@
+"""Progress of long work: counts, rate and time left, on a terminal or in a log."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+_LOG_SECONDS = 10.0
+
+
+class ProgressLine:
+    """One line that says how far the work is; in a log, one line every ten seconds.
+
+    Args:
+        what: is counted, such as "episodes".
+        total: how many there are.
+        done: how many were there before.
+    """
+
+    def __init__(self, what: str, total: int, done: int) -> None:
+        self._what = what
+        self._total = total
+        self._before = done
+        self.done = done
+        self._begin = time.monotonic()
+        self._logged = self._begin
+        self._bar = _bar(what) if sys.stderr.isatty() else None
+        self._task = self._bar.add_task(what, total=total, completed=done, note="") if self._bar else None
+
+    def __enter__(self) -> Self:
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    @property
+    def rate(self) -> float:
+        """Items per second since the start."""
+        return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
+
+    def advance(self, count: int, note: str) -> None:
+        """Count items as done; the note is shown behind the rate."""
+        self.done += count
+        if self._bar and self._task is not None:
+            self._bar.update(self._task, advance=count, note=f"{self.rate:.1f}/s  {note}")
+        elif time.monotonic() - self._logged > _LOG_SECONDS:
+            self._logged = time.monotonic()
+            say(f"{self.done}/{self._total} {self._what}, {self.rate:.1f}/s, {self._left()} left, {note}")
+
+    def _left(self) -> str:
+        if self.done == self._before:
+            return "unknown time"
+        return duration((self._total - self.done) / self.rate)
+
+
+def _bar(what: str) -> Progress:
+    return Progress(
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
+    )
+
+
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Say what begins, and how long it took."""
+    begin = time.monotonic()
+    say(f"{what} ...")
+    yield
+    say(f"{what}: {duration(time.monotonic() - begin)}")
+
+
+def say(text: str) -> None:
+    """One line for the person who watches."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """A duration in the largest two units that matter: 2 h 05 min, 3 min 20 s, 12 s."""
+    whole = round(seconds)
+    if whole >= 3600:
+        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return f"{whole // 60} min {whole % 60:02d} s" if whole >= 60 else f"{whole} s"

@@ -1,0 +1,142 @@
+"""What one training process does: load, resume, run the core's loop, keep its state on disk, send word."""
+
+import time
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import ray.train
+import torch
+from ray.train.collective import broadcast_from_rank_zero
+from ray.train.torch import get_device, prepare_model
+
+from svaedc import checkpoint
+from svaedc.episodes import Episodes, split
+from svaedc.model import SvaeDc, initialised
+from svaedc.presets import Preset, Sizes, preset
+from svaedc.sampling import Shard
+from svaedc.training import EpochReport, fit
+from workers.dataset.cache import TrainingCache, training_cache
+from workers.dataset.folder import open_dataset
+
+MODEL = "model.pt"
+STATE = "training.pt"
+
+
+@dataclass(frozen=True)
+class TrainingJob:
+    """Everything a training process needs, as plain values.
+
+    Attributes:
+        dataset: its folder.
+        model: the folder of the model.
+        cache: where caches are kept.
+        origin: what the model is made from; a checkpoint of another origin is refused.
+        preset: its name.
+        updates: gradient updates of each stage; 0 for the preset's own number.
+        stride: control steps between two samples.
+        seed: of weights, order and draws.
+        threads: of torch, in each process.
+        time_limit: seconds after which training stops at the end of an epoch.
+        checkpoint_every: epochs between two checkpoints.
+    """
+
+    dataset: Path
+    model: Path
+    cache: Path
+    origin: dict[str, Any]
+    preset: str
+    updates: int
+    stride: int
+    seed: int
+    threads: int
+    time_limit: float
+    checkpoint_every: int
+
+    def data(self) -> TrainingCache:
+        """The training cache, decoded on this machine if it is not there yet."""
+        return training_cache(open_dataset(self.dataset), self.stride, self.cache)
+
+    def settings(self, cache: TrainingCache) -> Preset:
+        """The preset for this data, with the job's seed and budget."""
+        made = preset(self.preset)(Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2]))
+        training = replace(made.training, seed=self.seed)
+        if self.updates:
+            prior = self.updates if training.prior.updates else 0
+            training = replace(
+                training,
+                joint=replace(training.joint, updates=self.updates),
+                prior=replace(training.prior, updates=prior),
+            )
+        return Preset(made.model, training)
+
+
+def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
+    """Training and held-out episodes of a cache."""
+    everything = Episodes(cache.x, cache.xi, cache.bad, cache.y, rows=_all(cache))
+    return split(everything, cache.episode)
+
+
+def _all(cache: TrainingCache) -> Any:
+    return torch.arange(len(cache.episode)).numpy()
+
+
+def bounds(dataset: Path) -> tuple[list[float], list[float]]:
+    """Lower and upper bounds of the dataset's observation channels."""
+    channels = open_dataset(dataset).identity.observation
+    return [channel[2] for channel in channels], [channel[3] for channel in channels]
+
+
+def run_worker(config: dict[str, Any]) -> None:
+    """Train as one of Ray Train's workers; rank 0 writes the checkpoints and sends the reports."""
+    job: TrainingJob = config["job"]
+    context = ray.train.get_context()
+    shard = Shard(context.get_world_rank(), context.get_world_size())
+    torch.set_num_threads(job.threads)
+    begin = time.monotonic()
+    cache = job.data()
+    training, held_out = episodes(cache)
+    settings = job.settings(cache)
+    model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(get_device())
+    state = saved_state(job)
+    for report in fit(model, training, held_out, settings.training, state, shard, prepare_model):
+        late = broadcast_from_rank_zero(time.monotonic() - begin > job.time_limit)
+        if shard.rank == 0:
+            _keep(job, model, report, stopping=late or report.is_last)
+            config["mailbox"].put.remote(_message(report))
+        ray.train.report({"update": report.update})
+        if late:
+            return
+
+
+def saved_state(job: TrainingJob) -> dict[str, Any] | None:
+    """The state to continue from, if there is one.
+
+    Raises:
+        ValueError: when the folder's checkpoint is damaged or of another origin.
+    """
+    path = job.model / STATE
+    if not path.exists():
+        return None
+    content = checkpoint.read(path)
+    checkpoint.require(path, content["origin"], job.origin)
+    return content["state"]
+
+
+def _keep(job: TrainingJob, model: SvaeDc, report: EpochReport, *, stopping: bool) -> None:
+    if stopping or report.epoch % job.checkpoint_every == 0:
+        checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
+    if stopping:
+        checkpoint.save(
+            job.model / MODEL, model, {**job.origin, "update": report.update, "versions": _versions()}
+        )
+
+
+def _message(report: EpochReport) -> dict[str, Any]:
+    names = ("stage", "update", "updates", "metrics")
+    return {name: getattr(report, name) for name in names}
+
+
+def _versions() -> dict[str, str]:
+    return {name: version(name) for name in ("svaedc", "torch", "numpy")}
