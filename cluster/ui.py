@@ -1,5 +1,6 @@
 """Serves the MLflow pages of this project's store on loopback, until interrupted."""
 
+import ctypes
 import os
 import signal
 import socket
@@ -15,6 +16,8 @@ from cluster.errors import UsageError, UserError
 from cluster.tracking import UI_PORT, open_tracker
 
 HOST = "127.0.0.1"
+PR_SET_PDEATHSIG = 1
+"""Linux's `prctl` option: the signal a process gets when its parent dies."""
 START_SECONDS = 120.0
 STOP_SECONDS = 10.0
 
@@ -57,12 +60,30 @@ def _require_free(port: int) -> None:
 
 @contextmanager
 def _server(uri: str, port: int) -> Iterator[subprocess.Popen[bytes]]:
-    """The server in a process group of its own, which ends with the block: it has children."""
-    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri]
+    """The server in a process group of its own, because it has children; it ends with the block.
+
+    Should this process be killed outright, the kernel asks the server to stop.
+    """
+    command = [
+        sys.executable,
+        "-m",
+        "mlflow",
+        "server",
+        "--backend-store-uri",
+        uri,
+        "--registry-store-uri",
+        uri,
+    ]
     command += ["--host", HOST, "--port", str(port), "--workers", "1"]
     quiet = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
-    quiet |= {"UVICORN_LOG_LEVEL": "warning", "DO_NOT_TRACK": "true"}
-    server = subprocess.Popen(command, env={**os.environ, **quiet}, start_new_session=True)
+    prctl = ctypes.CDLL(None).prctl
+    server = subprocess.Popen(
+        command,
+        env={**os.environ, **quiet},
+        stdout=sys.stderr.fileno(),
+        start_new_session=True,
+        preexec_fn=lambda: prctl(PR_SET_PDEATHSIG, signal.SIGTERM),
+    )
     try:
         yield server
     finally:

@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests; they import the packages inside, after the run-time type checker is in place."""
+"""Fixtures shared by all tests; they import the packages inside, after the type checker is in place."""
 
 import os
 import socket

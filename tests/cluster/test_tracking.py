@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -155,9 +156,10 @@ def test_a_server_that_does_not_answer_is_refused(free_port):
 
 def test_a_store_that_fails_at_the_end_does_not_hide_the_blocks_error(tmp_path):
     tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{tmp_path}/mlflow.db"))
-    with pytest.raises(ValueError, match="the real reason") as raised, tracker.run("ends", "train", {}):
-        tracker.client._tracking_client.store.engine.dispose()
-        (tmp_path / "mlflow.db").write_bytes(b"spoilt" * 1000)
+    run = tracker.run("ends", "train", {})
+    tracker.client._tracking_client.store.engine.dispose()
+    (tmp_path / "mlflow.db").write_bytes(b"spoilt" * 1000)
+    with pytest.raises(ValueError, match="the real reason") as raised, run:
         raise ValueError("the real reason")
     assert any("cannot be used" in note for note in raised.value.__notes__)
 
@@ -176,7 +178,7 @@ def test_commands_that_create_a_store_at_once_share_one_experiment(tmp_path):
 
 @pytest.fixture
 def served(settings, tracker, free_port):
-    """`svaedc ui`'s function in a process of its own, with one finished run to show; yields process and page."""
+    """`svaedc ui` in a process of its own, with one run to show: the process and its page."""
     with tracker.run("franka push of the browser test", "compare", {}):
         pass
     program = (
@@ -197,6 +199,11 @@ def served(settings, tracker, free_port):
     process.stdout.close()
 
 
+def answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 def browse(page: str, profile: Path) -> str:
     """What a browser shows of a page, once its scripts had time to run."""
     command = [shutil.which("chromium"), "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
@@ -212,11 +219,21 @@ def test_the_served_page_lists_the_run_and_an_interrupt_ends_the_server(served, 
     assert "franka push of the browser test" in browse(page, tmp_path / "profile")
     process.send_signal(signal.SIGINT)
     process.wait(timeout=30)
-    with socket.socket() as probe:
-        assert probe.connect_ex(("127.0.0.1", free_port)) != 0
+    assert not answers(free_port)
 
 
-def test_a_taken_port_is_named(settings, tracker):
+def test_the_server_ends_when_its_command_is_killed_outright(served, free_port):
+    process, _ = served
+    assert answers(free_port)
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 20
+    while answers(free_port) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not answers(free_port)
+
+
+def test_a_taken_port_is_named(settings):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
