@@ -11,6 +11,12 @@ from workers.controllers.reference import ends, euler_angles, reference
 from workers.environments.environment import Channel
 from workers.environments.tabletop import Tabletop
 
+Triple = tuple[float, float, float]
+
+# Columns of a planned step.
+_POSITION, _VELOCITY, _ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 9)
+_ORIENTATION, _SPIN, _GAINS = slice(9, 13), slice(13, 16), slice(16, 18)
+
 
 @dataclass(frozen=True)
 class WaypointRanges:
@@ -73,14 +79,23 @@ class EndEffectorWaypoints(Controller):
         turns[0] += 2 * np.pi * np.round((turns[1] - turns[0]) / (2 * np.pi))  # the short way round
         targets = reference(corners, turns, horizon, environment.control_step)
         gains = np.repeat(points[:, 6:], np.diff(ends(horizon, self._waypoints)), axis=0)
-        steps = list(zip(*(part.tolist() for part in (*targets, gains)), strict=True))
+        steps = np.hstack([*targets, gains]).tolist()  # one list per step: few objects to collect
         turning, limits = self._turning, self._limits
 
         def command(step: int) -> Sequence[float]:
             state = arm.state
-            position, velocity, acceleration, orientation, spin, gains = steps[step]
-            force = _force(gains, position, velocity, acceleration, state.position, state.velocity)
-            moment = _moment(turning, orientation, spin, state.orientation, state.angular_velocity)
+            row = steps[step]
+            force = _force(
+                row[_GAINS],
+                row[_POSITION],
+                row[_VELOCITY],
+                row[_ACCELERATION],
+                state.position,
+                state.velocity,
+            )
+            moment = _moment(
+                turning, row[_ORIENTATION], row[_SPIN], state.orientation, state.angular_velocity
+            )
             return _torque(force, moment, arm.jacobian(), arm.gravity_torque(), limits)
 
         return command
@@ -93,11 +108,16 @@ def _force(
     wanted_acceleration: Sequence[float],
     position: Sequence[float],
     velocity: Sequence[float],
-) -> list[float]:
+) -> Triple:
     """The force kp (p* − p) + kd (ṗ* − ṗ) + p̈*, in N (the acceleration acts on a mass of 1 kg)."""
     kp, kd = gains
-    axes = zip(wanted_position, wanted_velocity, wanted_acceleration, position, velocity, strict=True)
-    return [kp * (p_ - p) + kd * (v_ - v) + a_ for p_, v_, a_, p, v in axes]
+    (x_, y_, z_), (vx_, vy_, vz_), (ax_, ay_, az_) = wanted_position, wanted_velocity, wanted_acceleration
+    (x, y, z), (vx, vy, vz) = position, velocity
+    return (
+        kp * (x_ - x) + kd * (vx_ - vx) + ax_,
+        kp * (y_ - y) + kd * (vy_ - vy) + ay_,
+        kp * (z_ - z) + kd * (vz_ - vz) + az_,
+    )
 
 
 def _moment(
@@ -106,20 +126,19 @@ def _moment(
     wanted_spin: Sequence[float],
     orientation: Sequence[float],
     spin: Sequence[float],
-) -> list[float]:
+) -> Triple:
     """The moment Kp e + Kd (ω* − ω), in N·m; e = 2 sin(θ/2) · axis of the rotation still to be made."""
     kp, kd = gains
     a, b, c, d = wanted_orientation
     x, y, z, w = orientation
-    sign = (
-        2.0 if a * x + b * y + c * z + d * w >= 0.0 else -2.0
-    )  # q and −q are one orientation: the short way
-    error = (
-        sign * (w * a - x * d - b * z + c * y),
-        sign * (w * b - y * d - c * x + a * z),
-        sign * (w * c - z * d - a * y + b * x),
+    (wx_, wy_, wz_), (wx, wy, wz) = wanted_spin, spin
+    # q and −q are one orientation: turn the short way.
+    stiffness = 2.0 * kp if a * x + b * y + c * z + d * w >= 0.0 else -2.0 * kp
+    return (
+        stiffness * (w * a - x * d - b * z + c * y) + kd * (wx_ - wx),
+        stiffness * (w * b - y * d - c * x + a * z) + kd * (wy_ - wy),
+        stiffness * (w * c - z * d - a * y + b * x) + kd * (wz_ - wz),
     )
-    return [kp * e + kd * (w_ - w) for e, w_, w in zip(error, wanted_spin, spin, strict=True)]
 
 
 def _torque(
@@ -131,13 +150,10 @@ def _torque(
 ) -> list[float]:
     """Jᵀ [force; moment] + gravity, clipped to ± the limits."""
     (fx, fy, fz), (mx, my, mz) = force, moment
-    linear, angular = jacobian
+    # The arm's joints come first; the fingers behind them have no limits here and are not commanded.
+    columns = zip(*jacobian[0], *jacobian[1], gravity, limits, strict=False)
     torques = [
-        a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g
-        for a, b, c, d, e, f, g in zip(*linear, *angular, gravity, strict=True)
+        (a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g, limit)
+        for a, b, c, d, e, f, g, limit in columns
     ]
-    # The arm's joints come first; behind them are the fingers, which have no limits here.
-    return [
-        limit if torque > limit else -limit if torque < -limit else torque
-        for torque, limit in zip(torques, limits, strict=False)
-    ]
+    return [limit if torque > limit else -limit if torque < -limit else torque for torque, limit in torques]

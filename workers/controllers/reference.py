@@ -1,7 +1,5 @@
 """What the hand should do at every control step: minimum-jerk positions, linear orientations, their rates."""
 
-from itertools import pairwise
-
 import numpy as np
 from jaxtyping import Float
 
@@ -20,22 +18,24 @@ def reference(
         Position, velocity, acceleration [horizon, 3], orientation as quaternions (x, y, z, w) [horizon, 4],
         and angular velocity [horizon, 3] wanted at the end of every step; SI units, in the world.
     """
-    pieces: list[tuple[np.ndarray, ...]] = []
     reached = ends(horizon, len(corners) - 1)
-    legs = zip(pairwise(reached), pairwise(corners), pairwise(turns), strict=True)
-    for (begin, end), (a, b), (turn_a, turn_b) in legs:
-        duration = (end - begin) * dt
-        s = (np.arange(1, end - begin + 1) / (end - begin))[:, None]
-        quaternion = quaternions(turn_a + s * (turn_b - turn_a))
-        pieces.append((*minimum_jerk(s, a, b, duration), quaternion))
-    position, velocity, acceleration, quaternion = (
-        np.concatenate(part) for part in zip(*pieces, strict=True)
+    steps = np.diff(reached)
+    leg = np.repeat(np.arange(len(steps)), steps)
+    s = ((np.arange(1, horizon + 1) - reached[leg]) / steps[leg])[:, None]
+    duration = (steps[leg] * dt)[:, None]
+    orientation = quaternions(turns[leg] + s * (turns[leg + 1] - turns[leg]))
+    return (
+        *minimum_jerk(s, corners[leg], corners[leg + 1], duration),
+        orientation,
+        angular_velocity(orientation, dt),
     )
-    return position, velocity, acceleration, quaternion, angular_velocity(quaternion, dt)
 
 
 def minimum_jerk(
-    s: Float[np.ndarray, "time 1"], a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], duration: float
+    s: Float[np.ndarray, "time 1"],
+    a: Float[np.ndarray, "#time d"],
+    b: Float[np.ndarray, "#time d"],
+    duration: Float[np.ndarray, "#time 1"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position, velocity, acceleration of the minimum-jerk motion a → b at the fractions s of its duration.
 

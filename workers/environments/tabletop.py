@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
-from workers.simulation.arm import Arm, ArmModel, Vector
+from workers.simulation.arm import Arm, ArmModel
 from workers.simulation.cylinder import Cylinder
 from workers.simulation.world import World
 
@@ -73,8 +73,8 @@ def _object_channels(name: str) -> list[Channel]:
     return positions + [Channel(f"{name}_{column}_axis_{axis}", "1", -1.0, 1.0) for column, axis in columns]
 
 
-Record = tuple[Vector, Vector, bool, tuple[tuple[Vector, Vector], ...]]
-"""Joint angles, position of the hand, whether the arm touches the table, pose of every object."""
+Record = tuple[float, ...]
+"""Joint angles, each object's position and quaternion, position of the hand, contact with the table (0, 1)."""
 
 
 class Tabletop(Environment):
@@ -112,21 +112,24 @@ class Tabletop(Environment):
         return self.record()
 
     def record(self) -> Record:
-        """Joint angles, position of the hand, contact with the table, pose of every object."""
+        """See `Record`; tuples are added rather than unpacked because this runs in every step."""
         state = self.arm.refresh()
-        poses = tuple([cylinder.pose() for cylinder in self._cylinders])
-        return state.joints, state.position, self.arm.touches(self._world.plane), poses
+        numbers = state.joints
+        for cylinder in self._cylinders:
+            position, orientation = cylinder.pose()
+            numbers += position + orientation
+        return numbers + state.position + (self.arm.touches(self._world.plane),)
 
     def observed(self, records: Sequence[Record]) -> Observed:
         """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T]."""
-        joints, hands, contacts, poses = zip(*records, strict=True)
-        flat = np.array([[(*position, *quaternion) for position, quaternion in pose] for pose in poses])
-        rows = [np.array(joints).T]
-        for number in range(len(self._cylinders)):
-            rows += [flat[:, number, :3].T, first_two_axes(flat[:, number, 3:])]
+        columns = np.array(records).T
+        rows = [columns[: len(self.observation) - 9 * len(self._cylinders)]]
+        poses = columns[len(rows[0]) : -4].reshape(len(self._cylinders), 7, len(records))
+        for pose in poses:
+            rows += [pose[:3], first_two_axes(pose[3:].T)]
         return Observed(
             xi=np.concatenate(rows).astype(np.float32),
-            signals={"hand_position": np.array(hands).T, "table_contact": np.array(contacts)},
+            signals={"hand_position": columns[-4:-1], "table_contact": columns[-1] != 0.0},
         )
 
     def close(self) -> None:

@@ -153,7 +153,7 @@ class Arm:
         return self.state
 
     def _read(self) -> ArmState:
-        joints = pybullet.getJointStates(self.body, self._joints, physicsClientId=self._client)
+        joints = pybullet.getJointStates(self.body, self._joints, self._client)
         # Without forward kinematics Bullet answers with the poses of one step before.
         centre, _, _, _, origin, orientation, velocity, spin = pybullet.getLinkState(
             self.body,
