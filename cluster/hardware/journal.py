@@ -167,6 +167,8 @@ class Journal:
         return broken
 
     def _campaign(self) -> tuple[str, Identity]:
+        if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
+            raise _absent(self.path)
         query = "SELECT name, robot, setup, method, seed, model, pool, trials, approval FROM campaign"
         try:
             row = self._connection.execute(query).fetchone()
@@ -214,6 +216,11 @@ def create(path: Path, name: str, identity: Identity) -> None:
         for statement in SCHEMA:
             connection.execute(statement)
         connection.execute("INSERT OR IGNORE INTO campaign VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
+
+
+def _absent(path: Path) -> JournalError:
+    """For a folder without journal, or one whose creation was cut short."""
+    return JournalError(f"no campaign in {path.parent}: name the folder of one, or start one there")
 
 
 def _repeated(event: Event, number: int, new: State, who: str, body: str) -> Event:

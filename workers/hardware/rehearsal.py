@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from workers.controllers.controller import unit_cube
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
 from workers.randomness import generator
@@ -47,9 +48,10 @@ class RehearsalRobot:
         began = time.monotonic()
         if self._stopped.is_set():
             raise RobotFault(f"trial {trial_id} was not started: the robot has been stopped")
+        controller = unit_cube(x.astype(np.float32), self._simulated.dimensions)
         self._ledger.start(trial_id, x)
         with self._simulated.open() as simulation:
-            episode = rollout(self._simulated, simulation, x.astype(np.float32), self._physics)
+            episode = rollout(self._simulated, simulation, controller, self._physics)
         if self._stopped.wait(max(0.0, self._pace - (time.monotonic() - began))):
             raise RobotFault(f"trial {trial_id} was stopped before its end")
         evidence = hashlib.sha256(episode.xi.tobytes()).hexdigest()

@@ -1,0 +1,170 @@
+"""What a person sees and decides."""
+
+import json
+import os
+import signal
+from contextlib import closing
+from dataclasses import asdict, replace
+
+import pytest
+
+from cluster.errors import UsageError
+from cluster.hardware import campaign, journal, operator
+from cluster.hardware.identity import Approval
+from cluster.hardware.journal import IllegalTransition
+from cluster.hardware.lock import FolderLock, FolderTaken, Process
+from cluster.hardware.standing import Standing
+from cluster.hardware.states import State
+from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
+
+IN_MOTION = 13
+AFTER_MOTION = 14
+"""Points of the first trial's way, see test_kills."""
+
+
+def die(processes, folder, point):
+    process = processes.Process(target=carry_out, args=(folder, point))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+
+
+def test_a_trial_left_running_is_explained_and_resolved_as_measured(processes, tmp_path):
+    die(processes, tmp_path, IN_MOTION)
+    assert operator.status(tmp_path).standing is Standing.RUNNING
+    assert "left behind by a dead process" in operator.status(tmp_path).advice
+    carry_out(tmp_path)
+    seen = operator.status(tmp_path)
+    assert seen.standing is Standing.AWAITS_RESOLUTION
+    assert "its ledger: started, never ended" in seen.advice
+    assert f"svaedc hardware resolve {tmp_path} --trial 0" in seen.advice
+    trial = operator.resolve(tmp_path, 0, "measured", "Ada", "read it off the tape", 0.5, 0.1)
+    assert (trial.state, trial.measurement) == (State.MEASURED, (0.5, 0.1))
+    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert starts(tmp_path) == [f"desk-1-{number:03d}" for number in range(4)]
+
+
+def test_what_the_ledger_still_knows_is_told(processes, tmp_path):
+    die(processes, tmp_path, AFTER_MOTION)
+    carry_out(tmp_path)
+    measurement = DeskRobot(tmp_path, Fuse(-1)).motion("desk-1-000").measurement
+    assert f"its ledger: ended with f {measurement.f}, y {measurement.y}" in operator.status(tmp_path).advice
+
+
+@pytest.mark.parametrize("outcome", ["failed", "aborted"])
+def test_a_running_trial_can_be_resolved_at_once_and_is_replaced_by_another(processes, tmp_path, outcome):
+    die(processes, tmp_path, IN_MOTION)
+    operator.resolve(tmp_path, 0, outcome, "Ada", "it fell", None, None)
+    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    with closing(opened(tmp_path)) as book:
+        assert [trial.state for trial in book.trials()] == [outcome, *4 * ["measured"]]
+        past = [event for event in book.events() if event.trial == 0]
+    assert [event.new for event in past][-3:] == ["running", "unknown", outcome]
+    assert past[-1].who == "operator: Ada"
+    assert json.loads(past[-1].body) == {"note": "it fell"}
+
+
+def test_a_trial_that_runs_at_this_moment_is_not_resolved(tmp_path):
+    journal.create(tmp_path / journal.FILE, "desk-1", IDENTITY)
+    with closing(opened(tmp_path)) as book, FolderLock(tmp_path, 0.0):
+        trial = campaign.propose(campaign_on(book, DeskRobot(tmp_path, Fuse(-1))))
+        for state in (State.CHECKED, State.APPROVED, State.GRANTED, State.RUNNING):
+            trial = campaign.record(book, trial, state, "test", {})
+        with pytest.raises(FolderTaken, match=f"process {os.getpid()}"):
+            operator.resolve(tmp_path, 0, "aborted", "Ada", "no", None, None)
+        assert book.trial(0).state is State.RUNNING
+
+
+def test_an_amendment_replaces_the_measurement_and_keeps_the_old(tmp_path):
+    carry_out(tmp_path)
+    assert operator.resolve(tmp_path, 2, "measured", "Ada", "tape was wrong", -0.5, 0.0).measurement == (
+        -0.5,
+        0.0,
+    )
+    assert len([line for line in operator.export(tmp_path) if '"new":"measured"' in line]) == 5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"outcome": "done"}, "outcome must be one of measured, failed, aborted, got 'done'"),
+        ({"note": " "}, "a resolution needs a note"),
+        ({"who": ""}, "who must name a person"),
+        ({"f": None}, "a measured trial needs a finite objective, got None"),
+        ({"f": float("nan")}, "a measured trial needs a finite objective, got nan"),
+        ({"y": None}, r"a measured trial needs a badness in \[0, 1\], got None"),
+        ({"y": 1.1}, r"a measured trial needs a badness in \[0, 1\], got 1.1"),
+        ({"outcome": "failed"}, "f and y belong to the outcome measured"),
+    ],
+)
+def test_a_resolution_that_lacks_something_is_refused(tmp_path, change, message):
+    carry_out(tmp_path)
+    good = {"outcome": "measured", "who": "Ada", "note": "seen", "f": 0.5, "y": 0.1}
+    with pytest.raises(UsageError, match=message):
+        operator.resolve(tmp_path, 0, **(good | change))
+
+
+def test_an_ended_trial_is_not_resolved_into_something_else(tmp_path):
+    carry_out(tmp_path)
+    with pytest.raises(IllegalTransition, match="from measured to aborted; legal from there: measured"):
+        operator.resolve(tmp_path, 0, "aborted", "Ada", "seen", None, None)
+
+
+def test_a_waiting_trial_is_named_with_the_command_that_approves_it(tmp_path):
+    identity = replace(IDENTITY, approval=Approval.OPERATOR)
+    carry_out(tmp_path, identity=identity)
+    seen = operator.status(tmp_path)
+    assert seen.standing is Standing.AWAITS_APPROVAL
+    assert f"svaedc hardware approve {tmp_path} --trial 0 --who NAME" in seen.advice
+    assert operator.approve(tmp_path, 0, "Ada").state is State.APPROVED
+    with pytest.raises(IllegalTransition, match="from approved to approved"):
+        operator.approve(tmp_path, 0, "Grace")
+
+
+def test_nobody_is_not_a_person(tmp_path):
+    carry_out(tmp_path, identity=replace(IDENTITY, approval=Approval.OPERATOR))
+    with pytest.raises(UsageError, match="who must name a person"):
+        operator.approve(tmp_path, 0, "  ")
+
+
+def test_status_counts_and_finds_the_best(tmp_path):
+    carry_out(tmp_path)
+    seen = operator.status(tmp_path)
+    assert (seen.measured, seen.planned, seen.standing, seen.advice) == (4, 4, Standing.COMPLETE, "")
+    assert seen.best == max(trial.f for trial in seen.trials)
+
+
+def test_a_failed_trial_is_told_with_its_reason(tmp_path):
+    journal.create(tmp_path / journal.FILE, "desk-1", IDENTITY)
+    with closing(opened(tmp_path)) as book:
+        campaign.advance(campaign_on(book, DeskRobot(tmp_path, Fuse(-1), faulty=frozenset({0}))))
+    assert operator.status(tmp_path).advice.startswith("trial 0 was failed: a motor is hot; see to it")
+
+
+def test_the_export_is_the_campaign_and_every_event(tmp_path):
+    carry_out(tmp_path)
+    first, *events = [json.loads(line) for line in operator.export(tmp_path)]
+    assert first == {"campaign": "desk-1", **asdict(IDENTITY)}
+    with closing(opened(tmp_path)) as book:
+        assert events == [asdict(event) for event in book.events()]
+
+
+def hold(folder, held, let_go):
+    with FolderLock(folder, 0.0):
+        held.set()
+        let_go.wait()
+
+
+def test_the_lock_names_the_process_that_holds_it_and_dies_with_it(processes, tmp_path):
+    held, let_go = processes.Event(), processes.Event()
+    process = processes.Process(target=hold, args=(tmp_path, held, let_go))
+    process.start()
+    assert held.wait(timeout=30)
+    assert operator.lock.holder(tmp_path) == replace(Process.own(), pid=process.pid)
+    with pytest.raises(FolderTaken, match=f"process {process.pid}"):
+        FolderLock(tmp_path, 0.2)
+    process.kill()
+    process.join()
+    with FolderLock(tmp_path, 5.0):
+        assert operator.lock.holder(tmp_path) == Process.own()
+    assert operator.lock.holder(tmp_path) is None
