@@ -1,6 +1,7 @@
 """Fixtures shared by all tests; they import the packages inside, after the type checker is in place."""
 
 import os
+import secrets
 import socket
 from pathlib import Path
 
@@ -10,6 +11,10 @@ import pytest
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 os.environ["MLFLOW_DISABLE_TELEMETRY"] = "true"
 os.environ["DO_NOT_TRACK"] = "true"
+# Ray: clusters listen on loopback only. It is read when Ray is imported.
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
+# Clusters of the tests have a token of their own and leave ~/.ray alone.
+os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
