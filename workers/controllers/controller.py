@@ -45,5 +45,5 @@ def unit_cube(x: Sequence[float] | np.ndarray, dimensions: int) -> Float32[np.nd
         raise ValueError(f"x must have shape ({dimensions},), got {vector.shape}")
     outside = np.flatnonzero(~((vector >= 0.0) & (vector <= 1.0)))
     if outside.size:
-        raise ValueError(f"x must lie in [0, 1]; x[{outside[0]}] is {vector[outside[0]]}")
+        raise ValueError(f"x must lie in [0, 1]; x[{outside[0]}] is {vector[outside[0]]!s}")
     return vector

@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from importlib.metadata import version
-from typing import Any, Self
+from typing import Any
 
 from workers.rollout import VERSION as ROLLOUT_VERSION
 from workers.setups import Setup
@@ -62,7 +62,7 @@ class Identity:
         return json.dumps(asdict(self), sort_keys=True, separators=(",", ":"))
 
     @classmethod
-    def from_json(cls, text: str) -> Self:
+    def from_json(cls, text: str) -> "Identity":
         """The identity that `to_json` wrote.
 
         Raises:

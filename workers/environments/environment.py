@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -75,7 +75,7 @@ class Environment(ABC):
     def close(self) -> None:
         """End the simulation."""
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Environment":
         return self
 
     def __exit__(

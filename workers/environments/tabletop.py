@@ -73,8 +73,10 @@ def _object_channels(name: str) -> list[Channel]:
     return positions + [Channel(f"{name}_{column}_axis_{axis}", "1", -1.0, 1.0) for column, axis in columns]
 
 
+_FAR = 1e3  # m, rad and rad/s
+
 Record = tuple[float, ...]
-"""Joint angles, each object's position and quaternion, position of the hand, contact with the table (0, 1)."""
+"""Joint angles, each object's position and quaternion, the hand's position, contact with the table (0, 1)."""
 
 
 class Tabletop(Environment):
@@ -84,6 +86,11 @@ class Tabletop(Environment):
         self.observation = model.observation()
         self.action = model.action()
         self.control_step = model.control_step
+        self._model = model
+        self._build()
+
+    def _build(self) -> None:
+        model = self._model
         self._world = World(time_step=model.control_step, solver_iterations=model.solver_iterations)
         self.arm = Arm(self._world, model.arm)
         self._cylinders = [
@@ -92,6 +99,9 @@ class Tabletop(Environment):
 
     def reset(self, physics: Physics) -> None:
         """Arm at home, objects at their start, with the dynamics named in `physics`."""
+        if not self._is_sane():
+            self._world.close()
+            self._build()
         for number, cylinder in enumerate(self._cylinders, 1):
             prefix = f"object{number}_"
             cylinder.set_dynamics(
@@ -104,6 +114,10 @@ class Tabletop(Environment):
         self.arm.reset()
         for cylinder in self._cylinders:
             cylinder.reset()
+
+    def _is_sane(self) -> bool:
+        """Whether a reset is enough: a world that held NaN or threw a body far out does not recover."""
+        return all(abs(number) < _FAR for number in (*self.record(), *self.arm.state.speeds))
 
     def step(self, command: Sequence[float]) -> Record:
         """Apply joint torques for one control step."""
@@ -118,7 +132,7 @@ class Tabletop(Environment):
         for cylinder in self._cylinders:
             position, orientation = cylinder.pose()
             numbers += position + orientation
-        return numbers + state.position + (self.arm.touches(self._world.plane),)
+        return numbers + state.position + (float(self.arm.touches(self._world.plane)),)
 
     def observed(self, records: Sequence[Record]) -> Observed:
         """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T]."""

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Iterator
 from types import TracebackType
-from typing import Self
 
 import pybullet
 
@@ -42,7 +41,7 @@ class World:
         self._intangible: set[tuple[int, int]] = set()
         self._filters: dict[tuple[int, int], tuple[int, int]] = {}
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "World":
         return self
 
     def __exit__(

@@ -1,0 +1,235 @@
+"""What every setup must obey, whatever its robot."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from workers import setups
+from workers.gymnasium_environment import SetupEnvironment
+from workers.physics import PhysicsRanges
+from workers.randomness import generator
+from workers.rollout import Episode, random_episode, rollout
+
+
+@pytest.fixture(scope="module", params=sorted(setups.MODULES))
+def setup(request):
+    return setups.load(request.param)
+
+
+@pytest.fixture(scope="module")
+def environment(setup):
+    with setup.open() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def episodes(setup, environment) -> list[Episode]:
+    return [random_episode(setup, environment, 0, index) for index in range(6)]
+
+
+def _bytes(episode: Episode) -> bytes:
+    numbers = np.array([episode.y, episode.f])
+    return b"".join(part.tobytes() for part in (episode.x, episode.xi, episode.bad, numbers))
+
+
+def _nominal(setup) -> dict[str, float]:
+    return {name: (low + high) / 2 for name, (low, high) in setup.physics.intervals.items()}
+
+
+def test_setup_describes_itself_consistently(setup):
+    assert setup.dimensions == len(setup.controller.parameters)
+    assert setup.objective_limits[0] < setup.success < setup.objective_limits[1]
+    assert 1 <= len(setup.conditions) <= 8
+    assert {"paper", "training", "wide"} <= set(setup.gaps)
+    for gap in setup.gaps.values():
+        assert gap.intervals.keys() == setup.physics.intervals.keys()
+    names = [channel.name for channel in setup.observation]
+    assert len(set(names)) == len(names)
+
+
+def test_unknown_gap_level_is_refused_with_the_nearest(setup):
+    with pytest.raises(LookupError, match="did you mean 'paper'"):
+        setup.gap("papr")
+
+
+def test_trajectories_have_the_channels_and_the_horizon_of_the_setup(setup, episodes):
+    for episode in episodes:
+        assert episode.xi.shape == (len(setup.observation), setup.horizon)
+        assert episode.xi.dtype == np.float32
+        assert episode.x.shape == (setup.dimensions,)
+        assert episode.x.dtype == np.float32
+        assert episode.bad.shape == (setup.horizon,)
+        assert episode.stop == ""
+
+
+def test_trajectories_stay_within_the_bounds_of_their_channels(setup, episodes):
+    for row, channel in enumerate(setup.observation):
+        values = np.concatenate([episode.xi[row] for episode in episodes])
+        assert values.min() >= channel.low - 1e-5, channel.name
+        assert values.max() <= channel.high + 1e-5, channel.name
+
+
+def test_badness_is_the_share_of_steps_with_a_bad_bit(episodes):
+    for episode in episodes:
+        assert episode.y == pytest.approx(np.count_nonzero(episode.bad) / len(episode.bad), abs=1e-12)
+
+
+def test_bad_bits_name_only_conditions_of_the_setup(setup, episodes):
+    for episode in episodes:
+        assert int(episode.bad.max()) < 2 ** len(setup.conditions)
+
+
+def test_objectives_lie_within_their_limits_and_are_exact_in_float32(setup, episodes):
+    low, high = setup.objective_limits
+    for episode in episodes:
+        assert np.float32(low) <= episode.f <= np.float32(high)
+        assert episode.f == float(np.float32(episode.f))
+
+
+def test_different_controllers_move_differently(episodes):
+    assert len({_bytes(episode) for episode in episodes}) == len(episodes)
+
+
+def test_every_physics_parameter_changes_the_trajectory(setup, environment, episodes):
+    """Over a few controllers, since one need not touch every object."""
+    nominal = _nominal(setup)
+    controllers = [episode.x for episode in episodes]
+    unchanged = [rollout(setup, environment, x, nominal).xi for x in controllers]
+    for name, value in nominal.items():
+        varied = nominal | {name: value * 1.05}
+        differs = (
+            not np.array_equal(rollout(setup, environment, x, varied).xi, xi)
+            for x, xi in zip(controllers, unchanged, strict=True)
+        )
+        assert any(differs), f"{name} changes nothing"
+
+
+def test_physics_with_an_unknown_or_missing_parameter_is_refused(setup, environment):
+    x = np.full(setup.dimensions, 0.5)
+    with pytest.raises(ValueError, match="gravity"):
+        rollout(setup, environment, x, _nominal(setup) | {"gravity": 9.81})
+    name, *_ = _nominal(setup)
+    with pytest.raises(ValueError, match=name):
+        rollout(setup, environment, x, {k: v for k, v in _nominal(setup).items() if k != name})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda x: np.append(x, 0.5), r"shape \(\d+,\)"),
+        (lambda x: x[:-1], r"shape \(\d+,\)"),
+        (lambda x: x.reshape(1, -1), r"shape \(\d+,\)"),
+        (lambda x: np.where(np.arange(x.size) == 3, np.nan, x), r"x\[3\] is nan"),
+        (lambda x: np.where(np.arange(x.size) == 2, 1.01, x), r"x\[2\] is 1.01"),
+        (lambda x: np.where(np.arange(x.size) == 0, -0.01, x), r"x\[0\] is -0.01"),
+        (lambda x: np.where(np.arange(x.size) == 1, np.inf, x), r"x\[1\] is inf"),
+    ],
+)
+def test_controllers_outside_the_unit_cube_are_refused(setup, environment, spoil, message):
+    with pytest.raises(ValueError, match=message):
+        rollout(setup, environment, spoil(np.full(setup.dimensions, 0.5)), _nominal(setup))
+
+
+def test_episodes_are_bit_identical_in_reverse_order_and_after_others(setup, environment, episodes):
+    for index in reversed(range(len(episodes))):
+        assert _bytes(random_episode(setup, environment, 0, index)) == _bytes(episodes[index])
+
+
+def test_episodes_are_bit_identical_in_a_fresh_process(setup, episodes):
+    script = (
+        "import hashlib, json, sys\n"
+        "import numpy as np\n"
+        "from workers import setups\n"
+        "from workers.rollout import random_episode\n"
+        "setup = setups.load(sys.argv[1])\n"
+        "with setup.open() as environment:\n"
+        "    episodes = [random_episode(setup, environment, 0, index) for index in (4, 1)]\n"
+        "digests = [hashlib.sha256(e.xi.tobytes() + e.bad.tobytes()).hexdigest() for e in episodes]\n"
+        "print(json.dumps(digests))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, setup.name], capture_output=True, text=True, check=True, timeout=120
+    )
+    expected = [
+        hashlib.sha256(episodes[index].xi.tobytes() + episodes[index].bad.tobytes()).hexdigest()
+        for index in (4, 1)
+    ]
+    assert json.loads(done.stdout.splitlines()[-1]) == expected
+
+
+@pytest.mark.slow
+def test_thousands_of_shuffled_episodes_leave_nothing_behind(setup, environment):
+    """Each of 200 episodes runs ten times in shuffled order, and equals itself in a simulation of its own."""
+    expected = {}
+    for index in range(200):
+        with setup.open() as fresh:
+            expected[index] = _bytes(random_episode(setup, fresh, 1, index))
+    order = np.tile(np.arange(200), 10)
+    np.random.default_rng(0).shuffle(order)
+    for index in order.tolist():
+        assert _bytes(random_episode(setup, environment, 1, index)) == expected[index], index
+
+
+def test_gymnasium_accepts_the_environment(setup):
+    environment = SetupEnvironment(setup)
+    with warnings.catch_warnings():
+        # It warns of bounds beyond [-1, 1] and of an environment made without a registry.
+        warnings.filterwarnings("ignore", message=".*(not normalized|symmetric|spec|normalize).*")
+        check_env(environment, skip_render_check=True)
+    environment.close()
+    assert environment.action_space.shape == (len(environment.action_space.low),)
+
+
+def test_gymnasium_steps_reproduce_a_rollout_bit_for_bit(setup):
+    adapter = SetupEnvironment(setup)
+    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    _, info = adapter.reset(seed=7)
+    with setup.open() as environment:
+        expected = rollout(setup, environment, x, info["physics"])
+        commands = _commands(setup, environment, x, info["physics"])
+    seen = [adapter.step(command) for command in commands]
+    adapter.close()
+    assert np.array_equal(np.stack([observation for observation, *_ in seen], axis=1), expected.xi)
+    assert [info["bad"] for *_, info in seen] == (expected.bad != 0).tolist()
+    assert [reward for _, reward, *_ in seen[:-1]] == [0.0] * (setup.horizon - 1)
+    assert seen[-1][1] == pytest.approx(expected.f, abs=1e-6)
+    ends = [truncated for *_, truncated, _ in seen]
+    assert ends == [False] * (setup.horizon - 1) + [True]
+
+
+def _commands(setup, environment, x, physics) -> list[np.ndarray]:
+    environment.reset(physics)
+    command = setup.controller.start(x, environment, setup.horizon)
+    issued = []
+    for step in range(setup.horizon):
+        issued.append(np.array(command(step)))
+        environment.step(issued[-1].tolist())
+    return issued
+
+
+def test_commands_stay_within_the_action_channels_at_every_corner(setup, environment):
+    rng = np.random.default_rng(0)
+    corners = [np.zeros(setup.dimensions), np.ones(setup.dimensions)]
+    corners += [rng.integers(0, 2, setup.dimensions) for _ in range(4)]
+    low, high = (np.array([getattr(c, bound) for c in environment.action]) for bound in ("low", "high"))
+    for corner in corners:
+        commands = np.array(_commands(setup, environment, corner.astype(np.float32), _nominal(setup)))
+        assert commands.shape == (setup.horizon, len(environment.action))
+        assert np.all((low <= commands) & (commands <= high))
+
+
+def test_unknown_setup_is_refused_with_the_nearest():
+    with pytest.raises(LookupError, match="unknown setup 'fanka'; did you mean 'franka'"):
+        setups.load("fanka")
+
+
+@pytest.mark.parametrize("interval", [(0.2, 0.1), (-0.1, 0.1), (0.0, float("inf")), (float("nan"), 1.0)])
+def test_impossible_physics_ranges_are_refused(interval):
+    with pytest.raises(ValueError, match="physics range of mass"):
+        PhysicsRanges({"mass": interval})
