@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import ray
 import torch
 from ray.train import FailureConfig, RunConfig, ScalingConfig, TrainingFailedError
 from ray.train.torch import TorchTrainer
@@ -19,7 +20,7 @@ from cluster.mailbox import mailbox
 from cluster.progress import ProgressLine, say
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
-from cluster.training_job import MODEL, STATE, TrainingJob, episodes, run_worker, saved_state
+from cluster.training_job import MODEL, STATE, TrainingJob, done, episodes, run_worker, saved_state
 from svaedc import checkpoint, diagnostics
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
@@ -144,7 +145,7 @@ def _submit(job: TrainingJob, workers: int, session: Session, run: Run) -> None:
             run_worker,
             train_loop_config={"job": job, "mailbox": box},
             scaling_config=ScalingConfig(
-                num_workers=workers, use_gpu=session.gpus > 0, resources_per_worker={"CPU": job.threads}
+                num_workers=workers, use_gpu=_has_gpus(), resources_per_worker={"CPU": job.threads}
             ),
             run_config=RunConfig(
                 name=uuid.uuid4().hex,
@@ -172,11 +173,7 @@ def _updates(job: TrainingJob) -> int:
 
 def _done(job: TrainingJob) -> int:
     state = saved_state(job)
-    if state is None:
-        return 0
-    settings = job.settings(job.data()).training
-    before = settings.joint.updates if state["stage"] == "prior" else 0
-    return before + state["epoch"] * settings.epoch_updates
+    return 0 if state is None else done(state, job.settings(job.data()).training)
 
 
 def _receive(progress: ProgressLine, run: Run) -> Any:
@@ -222,6 +219,10 @@ def _judge(collapsed: str | None, update: int, updates: int, count: int) -> None
         raise UserError(f"{collapsed}. The checkpoint is kept, but should not be used")
     if collapsed:
         say(f"note, with only {count} episodes: {collapsed}")
+
+
+def _has_gpus() -> bool:
+    return bool(ray.cluster_resources().get("GPU", 0))
 
 
 def _device() -> str:

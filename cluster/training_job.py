@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import ray.train
 import torch
 from ray.train.collective import broadcast_from_rank_zero
@@ -13,9 +14,10 @@ from ray.train.torch import get_device, prepare_model
 
 from svaedc import checkpoint
 from svaedc.episodes import Episodes, split
-from svaedc.model import SvaeDc, initialised
+from svaedc.model import initialised
 from svaedc.presets import Preset, Sizes, preset
 from svaedc.sampling import Shard
+from svaedc.settings import TrainingSettings
 from svaedc.training import EpochReport, fit
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
@@ -74,12 +76,8 @@ class TrainingJob:
 
 def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
     """Training and held-out episodes of a cache."""
-    everything = Episodes(cache.x, cache.xi, cache.bad, cache.y, rows=_all(cache))
-    return split(everything, cache.episode)
-
-
-def _all(cache: TrainingCache) -> Any:
-    return torch.arange(len(cache.episode)).numpy()
+    rows = np.arange(len(cache.episode))
+    return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.episode)
 
 
 def bounds(dataset: Path) -> tuple[list[float], list[float]]:
@@ -100,14 +98,27 @@ def run_worker(config: dict[str, Any]) -> None:
     settings = job.settings(cache)
     model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(get_device())
     state = saved_state(job)
+    update = 0 if state is None else done(state, settings.training)
     for report in fit(model, training, held_out, settings.training, state, shard, prepare_model):
         late = broadcast_from_rank_zero(time.monotonic() - begin > job.time_limit)
+        update = report.update
         if shard.rank == 0:
-            _keep(job, model, report, stopping=late or report.is_last)
+            if late or report.is_last or report.epoch % job.checkpoint_every == 0:
+                checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
             config["mailbox"].put.remote(_message(report))
-        ray.train.report({"update": report.update})
+        ray.train.report({"update": update})
         if late:
-            return
+            break
+    if shard.rank == 0:
+        metadata = {**job.origin, "update": update, "versions": _versions()}
+        checkpoint.save(job.model / MODEL, model, metadata)
+
+
+def done(state: dict[str, Any], settings: TrainingSettings) -> int:
+    """Updates behind a saved state, over both stages."""
+    before = settings.joint.updates if state["stage"] == "prior" else 0
+    stage = settings.prior if state["stage"] == "prior" else settings.joint
+    return before + min(state["epoch"] * settings.epoch_updates, stage.updates)
 
 
 def saved_state(job: TrainingJob) -> dict[str, Any] | None:
@@ -122,15 +133,6 @@ def saved_state(job: TrainingJob) -> dict[str, Any] | None:
     content = checkpoint.read(path)
     checkpoint.require(path, content["origin"], job.origin)
     return content["state"]
-
-
-def _keep(job: TrainingJob, model: SvaeDc, report: EpochReport, *, stopping: bool) -> None:
-    if stopping or report.epoch % job.checkpoint_every == 0:
-        checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
-    if stopping:
-        checkpoint.save(
-            job.model / MODEL, model, {**job.origin, "update": report.update, "versions": _versions()}
-        )
 
 
 def _message(report: EpochReport) -> dict[str, Any]:
