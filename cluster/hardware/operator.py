@@ -10,10 +10,12 @@ from cluster.hardware import campaign, journal, lock
 from cluster.hardware.clock import utc_now
 from cluster.hardware.events import Trial, canonical
 from cluster.hardware.journal import Journal
-from cluster.hardware.lock import FolderLock
+from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.states import State
 from cluster.hardware.status import Status
 from cluster.hardware.status import status as look
+from workers.hardware import ledger
+from workers.hardware.ledger import MotionLedger
 
 OUTCOMES = (State.MEASURED, State.FAILED, State.ABORTED)
 
@@ -83,7 +85,9 @@ def close_abandoned(folder: Path, patience: float) -> None:
         if running:
             with FolderLock(folder, patience):
                 for trial in running:
-                    campaign.record(opened, trial, State.UNKNOWN, "recovery", {"ledger": None})
+                    motion = MotionLedger(folder / ledger.FILE).motion(campaign.trial_id(opened, trial))
+                    facts = {"ledger": asdict(motion), "found_by": asdict(Process.own())}
+                    campaign.record(opened, trial, State.UNKNOWN, "recovery", facts)
 
 
 def export(folder: Path) -> Iterator[str]:

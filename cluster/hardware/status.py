@@ -92,9 +92,7 @@ def _reason(journal: Journal) -> str:
 def _on_record(journal: Journal) -> str:
     """What the robot's ledger knew of the unknown trial when it was found."""
     found = next(event for event in reversed(journal.events()) if event.new is State.UNKNOWN)
-    ledger = json.loads(found.body).get("ledger")
-    if ledger is None:
-        return ""
+    ledger = json.loads(found.body)["ledger"]
     if ledger["measurement"] is None:
         return " (its ledger: started, never ended)" if ledger["started"] else " (its ledger: never started)"
     return f" (its ledger: ended with f {ledger['measurement']['f']}, y {ledger['measurement']['y']})"

@@ -12,6 +12,9 @@ from jaxtyping import Float
 
 from workers.hardware.driver import Measurement, Motion
 
+FILE = "starts.jsonl"
+"""In the folder of a campaign, whatever the robot."""
+
 STARTED = "started"
 ENDED = "ended"
 

@@ -9,13 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from workers.controllers.controller import unit_cube
+from workers.hardware import ledger
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
 from workers.randomness import generator
 from workers.rollout import rollout
 from workers.setups import Setup
-
-LEDGER = "starts.jsonl"
 
 
 class RehearsalRobot:
@@ -40,7 +39,7 @@ class RehearsalRobot:
         self._simulated = setup
         self._physics = setup.gaps["wide"].draw(generator(seed, "hidden-physics", 0))
         self._pace = pace
-        self._ledger = MotionLedger(folder / LEDGER)
+        self._ledger = MotionLedger(folder / ledger.FILE)
         self._stopped = threading.Event()
 
     def run(self, trial_id: str, x: Float[np.ndarray, " D"]) -> Measurement:
