@@ -1,0 +1,78 @@
+"""A dataset whose episodes cost nothing: random numbers in the shape of a rollout's record."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def identity():
+    """A small identity with the physics names out of order, as a setup may declare them."""
+    from workers.dataset.identity import Identity
+
+    return Identity(
+        setup="toy",
+        parameters=(("stiffness", 0.0, 1.0), ("damping", 0.0, 2.0)),
+        observation=(("joint", "rad", -1.0, 1.0), ("object_x", "m", -3.0, 3.0), ("object_y", "m", -3.0, 3.0)),
+        conditions=("tipped", "off_table"),
+        horizon=20,
+        control_step=0.002,
+        physics={"mass": (1.9, 2.1), "friction": (0.2, 0.4)},
+        seed=5,
+        episodes_per_shard=8,
+        schema_version=1,
+        rollout_version=1,
+        pybullet="3",
+        numpy="2",
+    )
+
+
+@pytest.fixture
+def episodes_of():
+    """(identity, indices) -> the episodes with those indices, each a function of (seed, index) alone."""
+    from workers.physics import PhysicsRanges
+    from workers.randomness import generator
+    from workers.rollout import Episode
+
+    def episode(identity, index: int) -> Episode:
+        rng = generator(identity.seed, "toy", index)
+        bad = rng.integers(0, 4, identity.horizon).astype(np.uint8)
+        return Episode(
+            x=generator(identity.seed, "controller", index).random(2, dtype=np.float32),
+            xi=rng.uniform(-1, 1, (3, identity.horizon)).astype(np.float32),
+            bad=bad,
+            y=float((bad != 0).mean()),
+            f=float(np.float32(rng.normal())),
+            stop="diverged" if index % 7 == 3 else "",
+            physics=PhysicsRanges(identity.physics).draw(generator(identity.seed, "physics", index)),
+        )
+
+    return lambda identity, indices: [episode(identity, index) for index in indices]
+
+
+@pytest.fixture
+def fill(episodes_of):
+    """(dataset, episodes) -> commits the shards that are missing."""
+    from workers.dataset import schema, shards
+
+    def commit_missing(dataset, episodes: int) -> None:
+        for shard in dataset.missing(episodes):
+            rows = episodes_of(dataset.identity, range(shard.start, shard.stop))
+            shards.commit(
+                dataset.folder,
+                shard,
+                lambda path, rows=rows, start=shard.start: schema.write(path, dataset.identity, start, rows),
+            )
+
+    return commit_missing
+
+
+@pytest.fixture
+def dataset(tmp_path: Path, identity, fill):
+    """Three shards of 8, 8 and 4 episodes."""
+    from workers.dataset.folder import create
+
+    created = create(tmp_path / "dataset", identity)
+    fill(created, 20)
+    return created

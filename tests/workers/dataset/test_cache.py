@@ -1,0 +1,128 @@
+"""The training cache against the dataset it was decoded from."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workers.dataset.cache import require_space, training_cache
+from workers.dataset.folder import create
+from workers.dataset.publication import writer
+from workers.dataset.shards import Shard
+
+SANE = [index for index in range(20) if index % 7 != 3]
+
+
+@pytest.mark.parametrize("stride", [1, 3, 5, 20])
+def test_the_cache_is_the_dataset_at_its_stride(dataset, tmp_path, identity, episodes_of, stride):
+    cache = training_cache(dataset, stride, tmp_path / "cache")
+    episodes = episodes_of(identity, SANE)
+    steps = np.arange(stride - 1, 20 // stride * stride, stride)
+    assert cache.episode.tolist() == SANE
+    assert np.array_equal(cache.x, np.stack([e.x for e in episodes]))
+    assert np.array_equal(cache.xi, np.stack([e.xi for e in episodes])[:, :, steps])
+    assert np.array_equal(cache.bad, (np.stack([e.bad for e in episodes])[:, steps] != 0).astype(np.float32))
+    assert np.array_equal(cache.y, np.array([e.y for e in episodes], dtype=np.float32))
+    assert np.array_equal(cache.f, np.array([e.f for e in episodes], dtype=np.float32))
+
+
+def test_diverged_episodes_are_left_out(dataset, tmp_path):
+    cache = training_cache(dataset, 5, tmp_path)
+    assert dataset.sane_episodes() == len(cache.episode) == 17
+    assert not set(cache.episode.tolist()) & {3, 10, 17}
+
+
+def test_the_arrays_are_memory_mapped_and_read_only(dataset, tmp_path):
+    cache = training_cache(dataset, 5, tmp_path)
+    assert isinstance(cache.xi, np.memmap)
+    assert not cache.xi.flags.writeable
+
+
+def test_held_out_and_training_rows_part_the_cache(dataset, tmp_path):
+    cache = training_cache(dataset, 5, tmp_path)
+    assert sorted([*cache.held_out(), *cache.training()]) == list(range(17))
+    assert cache.episode[cache.held_out()].tolist() == [9, 19]
+
+
+def test_held_out_episodes_stay_held_out_when_the_dataset_grows(dataset, tmp_path, fill):
+    before = training_cache(dataset, 5, tmp_path)
+    fill(dataset, 60)
+    after = training_cache(dataset, 5, tmp_path)
+    held_out = set(before.episode[before.held_out()].tolist())
+    assert held_out <= set(after.episode[after.held_out()].tolist())
+    assert not held_out & set(after.episode[after.training()].tolist())
+
+
+def test_a_second_opening_reads_what_the_first_has_built(dataset, tmp_path):
+    training_cache(dataset, 5, tmp_path)
+    built = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-stride5/*")}
+    training_cache(dataset, 5, tmp_path)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-stride5/*")} == built
+    assert len(built) == 7
+
+
+@pytest.mark.parametrize("stride", [0, -1, 21])
+def test_a_stride_that_does_not_fit_is_refused(dataset, tmp_path, stride):
+    with pytest.raises(ValueError, match=f"between 1 and the horizon 20, got {stride}"):
+        training_cache(dataset, stride, tmp_path)
+
+
+def test_an_empty_dataset_is_refused(tmp_path, identity):
+    with pytest.raises(ValueError, match="holds no episodes to train on; collect some first"):
+        training_cache(create(tmp_path / "empty", identity), 5, tmp_path)
+
+
+def test_a_damaged_shard_is_refused_by_name_and_leaves_no_cache(dataset, tmp_path):
+    path = dataset.path(Shard(8, 16))
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(ValueError, match=rf"{path.name} is damaged"):
+        training_cache(dataset, 5, tmp_path / "cache")
+    assert not (tmp_path / "cache").exists() or list((tmp_path / "cache").iterdir()) == []
+
+
+def test_a_disk_that_is_too_small_is_refused_with_both_sizes(tmp_path):
+    with pytest.raises(OSError, match=r"needs 54\.00 GB below .*, only 3\.20 GB are free.*train\.stride"):
+        require_space(54 * 10**9, 32 * 10**8, tmp_path)
+    assert require_space(10, 10, tmp_path) is None
+
+
+def test_a_dataset_larger_than_any_disk_is_refused_before_it_is_decoded(
+    tmp_path, identity, episodes_of, fill
+):
+    """Sizes come from the identity, so that a stride of 1 over a long horizon is refused in advance."""
+    dataset = create(tmp_path / "small", identity)
+    fill(dataset, 8)
+    wide = replace(identity, horizon=10**15)
+    with pytest.raises(OSError, match="GB are free"):
+        training_cache(replace(dataset, identity=wide), 1, tmp_path / "cache")
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+def test_what_a_killed_builder_left_behind_is_removed_by_the_next(dataset, tmp_path):
+    gone = subprocess.Popen([sys.executable, "-c", "pass"])
+    gone.wait()
+    host, boot, _ = writer().split(".")
+    left = tmp_path / f"0123456789abcdef-stride5.{host}.{boot}.{gone.pid}"
+    left.mkdir()
+    (left / "xi.npy").write_bytes(b"half")
+    training_cache(dataset, 5, tmp_path)
+    assert not left.exists()
+
+
+def test_two_processes_that_build_at_once_end_with_one_cache(dataset, tmp_path):
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from workers.dataset.folder import open_dataset\n"
+        "from workers.dataset.cache import training_cache\n"
+        "cache = training_cache(open_dataset(Path(sys.argv[1])), 5, Path(sys.argv[2]))\n"
+        "print(float(cache.xi.sum()))\n"
+    )
+    command = [sys.executable, "-c", script, str(dataset.folder), str(tmp_path / "cache")]
+    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    printed = [process.communicate(timeout=120)[0].splitlines()[-1] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    expected = float(training_cache(dataset, 5, tmp_path / "alone").xi.sum())
+    assert printed == [str(expected)] * 2
+    assert len(list((tmp_path / "cache").iterdir())) == 1

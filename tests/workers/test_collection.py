@@ -1,0 +1,125 @@
+"""Collecting real shards: the same bytes whoever collects them, however often, and whatever dies."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workers import setups
+from workers.collection import collect_shard
+from workers.dataset import shards
+from workers.dataset.folder import Dataset, create
+from workers.dataset.identity import identity_of
+from workers.dataset.shards import Shard
+from workers.dataset.verification import verify
+from workers.rollout import random_episode
+
+COLLECT = """
+import resource, sys
+from pathlib import Path
+from workers import setups
+from workers.collection import collect_shard
+from workers.dataset.folder import open_dataset
+
+dataset, largest_file = open_dataset(Path(sys.argv[1])), int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
+setup = setups.load("franka")
+for shard in dataset.missing(12):
+    collect_shard(setup, dataset, shard)
+"""
+UNLIMITED = 1 << 40
+
+
+def _new(folder: Path) -> Dataset:
+    return create(folder, identity_of(setups.load("franka"), seed=3, episodes_per_shard=4))
+
+
+def _start(dataset: Dataset, largest_file: int = UNLIMITED) -> subprocess.Popen:
+    command = [sys.executable, "-c", COLLECT, str(dataset.folder), str(largest_file)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+
+
+def _files(dataset: Dataset) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in dataset.folder.iterdir() if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Dataset:
+    setup = setups.load("franka")
+    dataset = _new(tmp_path_factory.mktemp("whole") / "dataset")
+    for shard in reversed(dataset.missing(12)):
+        collect_shard(setup, dataset, shard)
+    return dataset
+
+
+def test_a_collected_dataset_is_whole(whole):
+    assert [found for _, found in verify(whole)] == [[], [], []]
+    assert whole.episodes() == 12
+    assert whole.missing(12) == []
+
+
+def test_a_shard_holds_the_episodes_of_its_indices(whole):
+    setup = setups.load("franka")
+    columns = whole.read(Shard(4, 8))
+    with setup.open() as environment:
+        for row in (2, 0):
+            episode = random_episode(setup, environment, 3, 4 + row)
+            assert columns.xi[row].tobytes() == episode.xi.tobytes()
+            assert columns.f[row] == np.float32(episode.f)
+
+
+def test_a_franka_trajectory_takes_less_than_28_kb(whole):
+    assert whole.size() / whole.episodes() < 28_000
+
+
+def test_the_report_sums_up_the_shard(tmp_path):
+    dataset = _new(tmp_path / "dataset")
+    report = collect_shard(setups.load("franka"), dataset, Shard(0, 3))
+    columns = dataset.read(Shard(0, 3))
+    assert report.shard == Shard(0, 3)
+    assert report.badness == pytest.approx(columns.y.mean(), abs=1e-6)
+    assert report.best == columns.f.max()
+    assert report.diverged == 0
+    assert report.size == dataset.path(Shard(0, 3)).stat().st_size
+    assert report.rollout_seconds > report.storage_seconds >= 0.0
+
+
+def test_two_processes_collecting_the_same_shards_write_what_one_writes(tmp_path, whole):
+    dataset = _new(tmp_path / "dataset")
+    both = [_start(dataset), _start(dataset)]
+    errors = [process.communicate(timeout=300)[1] for process in both]
+    assert [process.returncode for process in both] == [0, 0], errors
+    assert _files(dataset) == _files(whole)
+    assert list((dataset.folder / ".writing").iterdir()) == []
+
+
+def test_a_collection_killed_midway_is_completed_to_the_same_bytes(tmp_path, whole):
+    dataset = _new(tmp_path / "dataset")
+    killed = _start(dataset)
+    while not dataset.shards() and killed.poll() is None:
+        time.sleep(0.005)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.communicate(timeout=60)
+    assert killed.returncode == -signal.SIGKILL
+    assert 1 <= len(dataset.shards()) < 3
+    shards.sweep(dataset.folder)
+    for shard in dataset.missing(12):
+        collect_shard(setups.load("franka"), dataset, shard)
+    assert _files(dataset) == _files(whole)
+    assert list((dataset.folder / ".writing").iterdir()) == []
+
+
+def test_a_file_that_may_not_grow_is_an_os_error_and_publishes_nothing(tmp_path):
+    dataset = _new(tmp_path / "dataset")
+    failed = _start(dataset, largest_file=50_000)
+    _, error = failed.communicate(timeout=120)
+    assert failed.returncode == 1
+    assert "OSError: [Errno 27]" in error
+    assert dataset.shards() == []
+    assert sorted(path.name for path in dataset.folder.iterdir()) == [".writing", "dataset.json"]
+    assert list((dataset.folder / ".writing").iterdir()) == []
