@@ -1,10 +1,8 @@
 """Collecting real shards: the same bytes whoever collects them, however often, and whatever dies."""
 
-import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +18,19 @@ from workers.dataset.verification import verify
 from workers.rollout import random_episode
 
 COLLECT = """
-import resource, sys
+import os, resource, signal, sys
 from pathlib import Path
 from workers import setups
 from workers.collection import collect_shard
 from workers.dataset.folder import open_dataset
 
-dataset, largest_file = open_dataset(Path(sys.argv[1])), int(sys.argv[2])
+dataset, largest_file, last = open_dataset(Path(sys.argv[1])), int(sys.argv[2]), sys.argv[3]
+
+def die(event, arguments):
+    if event == "os.link" and last in str(arguments[1]):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+sys.addaudithook(die)
 resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
 setup = setups.load("franka")
 for shard in dataset.missing(12):
@@ -39,8 +43,9 @@ def _new(folder: Path) -> Dataset:
     return create(folder, identity_of(setups.load("franka"), seed=3, episodes_per_shard=4))
 
 
-def _start(dataset: Dataset, largest_file: int = UNLIMITED) -> subprocess.Popen:
-    command = [sys.executable, "-c", COLLECT, str(dataset.folder), str(largest_file)]
+def _start(dataset: Dataset, *, largest_file: int = UNLIMITED, dies_at: str = "never") -> subprocess.Popen:
+    """Collects in a process of its own; `dies_at` is the name of the file it is killed before publishing."""
+    command = [sys.executable, "-c", COLLECT, str(dataset.folder), str(largest_file), dies_at]
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
 
 
@@ -100,13 +105,10 @@ def test_two_processes_collecting_the_same_shards_write_what_one_writes(tmp_path
 
 def test_a_collection_killed_midway_is_completed_to_the_same_bytes(tmp_path, whole):
     dataset = _new(tmp_path / "dataset")
-    killed = _start(dataset)
-    while not dataset.shards() and killed.poll() is None:
-        time.sleep(0.005)
-    os.kill(killed.pid, signal.SIGKILL)
-    killed.communicate(timeout=60)
+    killed = _start(dataset, dies_at=Shard(4, 8).name)
+    killed.communicate(timeout=300)
     assert killed.returncode == -signal.SIGKILL
-    assert 1 <= len(dataset.shards()) < 3
+    assert dataset.shards() == [Shard(0, 4)]
     shards.sweep(dataset.folder)
     for shard in dataset.missing(12):
         collect_shard(setups.load("franka"), dataset, shard)

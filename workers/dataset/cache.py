@@ -55,7 +55,8 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
     """Open the cache of a dataset at a stride below `parent`, decoding the dataset first if it must.
 
     Raises:
-        ValueError: when the stride does not fit the horizon, the dataset is empty, or a shard is damaged.
+        ValueError: when the stride does not fit the horizon, or the dataset is empty, damaged, or holds
+            episodes twice.
         OSError: when the disk is too small; the error names both sizes.
     """
     if not 1 <= stride <= dataset.identity.horizon:
@@ -70,6 +71,7 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
 
 
 def _build(dataset: Dataset, stride: int, folder: Path) -> None:
+    dataset.require_disjoint()
     count = dataset.sane_episodes()
     if count == 0:
         raise ValueError(f"{dataset.folder} holds no episodes to train on; collect some first")

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from workers.dataset import shards
@@ -25,6 +26,18 @@ class Dataset:
     def shards(self) -> list[Shard]:
         """The finished shards, in order."""
         return shards.present(self.folder)
+
+    def require_disjoint(self) -> None:
+        """Refuse a dataset that holds episodes twice, as two runs for different totals at once may leave it.
+
+        Raises:
+            ValueError: naming two shards that overlap.
+        """
+        for one, next_one in pairwise(self.shards()):
+            if next_one.start < one.stop:
+                raise ValueError(
+                    f"{one.name} and {next_one.name} in {self.folder} overlap; remove one of them"
+                )
 
     def missing(self, episodes: int) -> list[Shard]:
         """The shards still to be collected for that many episodes."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from workers.dataset import schema, shards
 from workers.dataset.cache import require_space, training_cache
 from workers.dataset.folder import create
 from workers.dataset.publication import writer
@@ -74,6 +75,13 @@ def test_an_empty_dataset_is_refused(tmp_path, identity):
         training_cache(create(tmp_path / "empty", identity), 5, tmp_path)
 
 
+def test_episodes_that_are_there_twice_are_refused_by_name(dataset, tmp_path, identity, episodes_of):
+    rows = episodes_of(identity, range(12, 24))
+    shards.commit(dataset.folder, Shard(12, 24), lambda path: schema.write(path, identity, 12, rows))
+    with pytest.raises(ValueError, match=r"-000000016.parquet and episodes-000000012-.* overlap"):
+        training_cache(dataset, 5, tmp_path)
+
+
 def test_a_damaged_shard_is_refused_by_name_and_leaves_no_cache(dataset, tmp_path):
     path = dataset.path(Shard(8, 16))
     path.write_bytes(path.read_bytes()[:-50])
@@ -88,9 +96,7 @@ def test_a_disk_that_is_too_small_is_refused_with_both_sizes(tmp_path):
     assert require_space(10, 10, tmp_path) is None
 
 
-def test_a_dataset_larger_than_any_disk_is_refused_before_it_is_decoded(
-    tmp_path, identity, episodes_of, fill
-):
+def test_a_dataset_larger_than_any_disk_is_refused_before_it_is_decoded(tmp_path, identity, fill):
     """Sizes come from the identity, so that a stride of 1 over a long horizon is refused in advance."""
     dataset = create(tmp_path / "small", identity)
     fill(dataset, 8)

@@ -49,7 +49,7 @@ partial_datasets = st.tuples(st.integers(1, 12), runs)
 
 
 def _left_by(runs: list[tuple[int, int]], per_shard: int) -> list[Shard]:
-    """What runs for growing totals left behind; bit i of a run's mask says whether its i-th shard survived."""
+    """What runs for growing totals left behind; bit i of a run's mask: its i-th shard survived."""
     done: list[Shard] = []
     for total, mask in sorted(runs):
         new = list(shards.missing(done, total, per_shard))
