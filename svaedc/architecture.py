@@ -15,6 +15,7 @@ _CHOICES: Final = {
     "distribution": ("laplace", "gaussian"),
     "head": ("low-rank", "dense"),
     "prior": ("mlp", "deconv"),
+    "posterior_input": ("residual", "scaled"),
 }
 _SIZES: Final = (
     "controller_dim",
@@ -54,11 +55,13 @@ class ModelConfig:
         distribution: Family of all four networks, `laplace` (the paper) or `gaussian`.
         head: Output of p(xi|tau): `dense` (the paper) or `low-rank` (ours).
         prior: p(tau, psi|x): `deconv` (the paper) or `mlp` (ours).
+        posterior_input: What q sees of xi: `scaled` to the observation range (the paper), or the `residual`
+            around the per-step median in units of each dimension's spread (ours).
         channels: Convolution channels of q, reversed in p(xi|tau).
         rank: Coefficients of the low-rank head.
         prior_hidden: Channels (`deconv`) or hidden units (`mlp`) of p(tau, psi|x).
         badness_hidden: Hidden units of p(y|psi).
-        latent_scale: Bounds of the latent scales.
+        latent_scale: Bounds of the latent scales; they start at the geometric mean.
         observation_scale: Bounds of the scales of xi: in units of the mean absolute residual of each
             dimension for `low-rank`, of the observation range for `dense`.
         badness_scale: Bounds of the scale of y.
@@ -73,11 +76,12 @@ class ModelConfig:
     distribution: str = "laplace"
     head: str = "low-rank"
     prior: str = "mlp"
+    posterior_input: str = "residual"
     channels: tuple[int, ...] = (32, 64, 128)
     rank: int = 80
     prior_hidden: tuple[int, ...] = (384, 384, 384)
     badness_hidden: tuple[int, ...] = (64, 64)
-    latent_scale: ScaleBounds = ScaleBounds(1e-3, 10.0)
+    latent_scale: ScaleBounds = ScaleBounds(1e-2, 100.0)
     observation_scale: ScaleBounds = ScaleBounds(0.1, 10.0)
     badness_scale: ScaleBounds = ScaleBounds(1e-2, 1.0)
 

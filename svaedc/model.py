@@ -13,7 +13,7 @@ from svaedc.decoders import HEADS, DenseHead, LowRankHead
 from svaedc.distributions import Diagonal, kl_divergence
 from svaedc.episodes import Episodes
 from svaedc.networks import PRIORS, Badness, Encoder
-from svaedc.normaliser import Normaliser, measure
+from svaedc.normaliser import POSTERIOR_INPUTS, Normaliser, measure
 
 STATISTICS_SAMPLE: Final = 2_000
 """Trajectories that the decoder's starting point is measured on; more change it by less than one percent."""
@@ -85,7 +85,8 @@ class SvaeDc(nn.Module):
         y: Float[Tensor, " batch"],
     ) -> Diagonal:
         """q(tau, psi | xi, y), event `[latent]`."""
-        return self.posterior_network(self.normaliser.scaled(xi), bad, y)
+        seen = POSTERIOR_INPUTS[self.config.posterior_input](self.normaliser, xi)
+        return self.posterior_network(seen, bad, y)
 
     def prior(self, x: Float[Tensor, "batch controller"]) -> Diagonal:
         """p(tau, psi | x), event `[latent]`."""

@@ -62,7 +62,7 @@ class Encoder(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> Diagonal:
-        """Posterior of the latent code given scaled trajectories."""
+        """Posterior of the latent code given normalised trajectories."""
         features = self.convolutions(torch.cat([xi, bad.unsqueeze(1)], dim=1)).flatten(1)
         return self.latent(torch.cat([features, y.unsqueeze(1)], dim=1))
 

@@ -40,6 +40,7 @@ def paper(sizes: Sizes) -> Preset:
         distribution="laplace",
         head="dense",
         prior="deconv",
+        posterior_input="scaled",
         prior_hidden=(512, 256, 128, 128),
         observation_scale=ScaleBounds(1e-3, 10.0),
     )
@@ -53,7 +54,8 @@ def paper(sizes: Sizes) -> Preset:
         gradient_norm=math.inf,
     )
     weighting = replace(WEIGHTINGS["paper"], warm_up=0.0)
-    return Preset(model, TrainingSettings(joint, replace(joint, updates=0), weighting, batch_size=32))
+    training = TrainingSettings(joint, joint, weighting, batch_size=32)
+    return Preset(model, training.with_updates(joint=joint.updates, prior=0))
 
 
 def compact(sizes: Sizes) -> Preset:

@@ -1,7 +1,7 @@
 """How a model is trained: budgets, optimisers and the weights of the bound."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import torch
@@ -113,6 +113,12 @@ class TrainingSettings:
         for name, least in (("batch_size", 1), ("epoch_updates", 1), ("held_out_sample", 2), ("seed", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+
+    def with_updates(self, joint: int, prior: int) -> "TrainingSettings":
+        """The same settings with other budgets; decaying schedules stretch along."""
+        return replace(
+            self, joint=replace(self.joint, updates=joint), prior=replace(self.prior, updates=prior)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain built-in values, for checkpoints and logs."""

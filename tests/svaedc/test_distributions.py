@@ -51,7 +51,7 @@ def test_log_prob_of_another_shape_is_refused_instead_of_broadcast(family):
 def test_kl_is_the_integral_of_q_times_the_log_ratio(family, loc_q, log_scale_q, loc_p, log_scale_p):
     q, p = one(family, loc_q, math.exp(log_scale_q)), one(family, loc_p, math.exp(log_scale_p))
     # The grid has a point at q's kink, and reaches so far that q's tails hold less than 1e-15.
-    steps = torch.linspace(-40.0, 40.0, 200_001, dtype=torch.float64) * math.exp(log_scale_q)
+    steps = torch.linspace(-40.0, 40.0, 40_001, dtype=torch.float64) * math.exp(log_scale_q)
     values = (loc_q + steps).unsqueeze(-1)
     log_q = TORCH[family](q.loc[0], q.scale[0]).log_prob(values).squeeze()
     log_p = TORCH[family](p.loc[0], p.scale[0]).log_prob(values).squeeze()

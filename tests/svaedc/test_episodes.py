@@ -44,7 +44,7 @@ def test_a_sample_is_part_of_the_selection_without_repetition(episodes):
 
 
 def test_arrays_of_different_lengths_are_refused(episodes):
-    with pytest.raises(ValueError, match="equally long.*rebuild the cache"):
+    with pytest.raises(ValueError, match=r"equally long.*rebuild the cache"):
         Episodes(episodes.x, episodes.xi[:-1], episodes.bad, episodes.y, episodes.rows)
 
 

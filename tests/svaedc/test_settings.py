@@ -55,6 +55,12 @@ def test_impossible_stages_are_refused(change, message):
         replace(STAGE, **change)
 
 
+def test_other_budgets_leave_everything_else_alone():
+    changed = SETTINGS.with_updates(joint=7, prior=0)
+    assert (changed.joint.updates, changed.prior.updates) == (7, 0)
+    assert changed.with_updates(joint=40_000, prior=40_000) == SETTINGS
+
+
 @pytest.mark.parametrize("name", ["batch_size", "epoch_updates", "held_out_sample"])
 def test_counts_below_their_minimum_are_refused(name):
     with pytest.raises(ValueError, match=f"{name} must be at least"):
@@ -63,5 +69,5 @@ def test_counts_below_their_minimum_are_refused(name):
 
 @pytest.mark.parametrize("weights", [(-1.0, 1.0, 0.1), (1.0, float("nan"), 0.1), (1.0, 1.0, 1.5)])
 def test_impossible_weights_are_refused(weights):
-    with pytest.raises(ValueError, match="must be finite|share of the updates"):
+    with pytest.raises(ValueError, match=r"must be finite|share of the updates"):
         Weighting(*weights)

@@ -93,7 +93,8 @@ def test_resuming_with_other_settings_is_refused_with_both_values(model, halves)
 
 def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves):
     untrained = evaluate(model, halves[1])
-    settings = replace(SHORT, joint=replace(JOINT, updates=300), epoch_updates=100)
+    settings = replace(SHORT.with_updates(joint=400, prior=50), epoch_updates=50)
+    settings = replace(settings, weighting=Weighting(kl=1.0, y=30.0, warm_up=0.1))
     last = trained(model, halves, settings)[-1]
     metrics = evaluate(model, halves[1])
     assert metrics["elbo"] > untrained["elbo"] + 10.0
@@ -148,7 +149,7 @@ def test_a_loss_that_is_not_finite_is_an_error_with_a_remedy(model, halves):
     training, held_out = halves
     xi = training.xi.copy()
     xi[training.rows] = np.nan
-    with pytest.raises(FloatingPointError, match="not finite after update 10.*diverged episodes"):
+    with pytest.raises(FloatingPointError, match=r"not finite after update 10.*diverged episodes"):
         next(fit(model, replace(training, xi=xi), held_out, SHORT))
 
 
