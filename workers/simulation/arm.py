@@ -154,27 +154,18 @@ class Arm:
 
     def _read(self) -> ArmState:
         joints = pybullet.getJointStates(self.body, self._joints, self._client)
-        # Without forward kinematics Bullet answers with the poses of one step before.
+        # With velocities and forward kinematics: without it Bullet answers with the poses of one step before.
         centre, _, _, _, origin, orientation, velocity, spin = pybullet.getLinkState(
-            self.body,
-            self._hand,
-            computeLinkVelocity=1,
-            computeForwardKinematics=1,
-            physicsClientId=self._client,
+            self.body, self._hand, 1, 1, self._client
         )
         angles, speeds, _, _ = zip(*joints, strict=True)
         return ArmState(angles, speeds, origin, orientation, _carried(velocity, spin, centre, origin), spin)
 
     def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
         """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
+        angles = self.state.joints + self._finger_rest
         return pybullet.calculateJacobian(
-            self.body,
-            self._hand,
-            _ORIGIN,
-            self.state.joints + self._finger_rest,
-            self._rest,
-            self._rest,
-            physicsClientId=self._client,
+            self.body, self._hand, _ORIGIN, angles, self._rest, self._rest, self._client
         )
 
     def gravity_torque(self) -> Vector:

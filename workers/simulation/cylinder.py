@@ -55,4 +55,4 @@ class Cylinder:
 
     def pose(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
         """Position in m and orientation as a quaternion (x, y, z, w)."""
-        return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+        return pybullet.getBasePositionAndOrientation(self.body, self._client)

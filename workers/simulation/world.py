@@ -57,7 +57,7 @@ class World:
 
     def step(self) -> None:
         """Advance by one time step."""
-        pybullet.stepSimulation(physicsClientId=self.client)
+        pybullet.stepSimulation(self.client)
 
     def make_intangible(self, body: int, links: Iterable[int]) -> None:
         """Let links touch nothing from the next `forget_contacts` on, like fingers kept shut."""
