@@ -39,18 +39,19 @@ def free_ports(count: int) -> list[int]:
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
     """Four logical CPUs behind token authentication; ended by its process id."""
-    port, dashboard, client = free_ports(3)
+    port, dashboard, agent, client = free_ports(4)
     folder, home = tmp_path_factory.mktemp("r"), tmp_path_factory.mktemp("home")
     token = "a" * 64
     command = [str(RAY), "start", "--head", "--block", "--disable-usage-stats", "--num-cpus=4"]
     command += ["--node-ip-address=127.0.0.1", f"--port={port}", f"--ray-client-server-port={client}"]
     command += ["--dashboard-host=127.0.0.1", f"--dashboard-port={dashboard}", f"--temp-dir={folder}"]
+    command += [f"--dashboard-agent-listen-port={agent}"]
     command += ["--object-store-memory=150000000"]
     environment = {**os.environ, "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": token, "HOME": str(home)}
     with (folder / "head.log").open("wb") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log, start_new_session=True)
     try:
-        wait_until_served(process, [port, dashboard], folder / "head.log")
+        wait_until_served(process, [port, dashboard, agent], folder / "head.log")
         yield Head(f"127.0.0.1:{port}", f"http://127.0.0.1:{dashboard}", token, folder, home)
     finally:
         process.send_signal(signal.SIGTERM)
