@@ -1,4 +1,13 @@
-"""The control loop, the only one in this project: one controller, one episode."""
+"""The control loop, the only one in this project: one controller, one episode.
+
+Example:
+    >>> from workers.setups import load
+    >>> setup = load("franka")
+    >>> with setup.open() as environment:
+    ...     episode = random_episode(setup, environment, seed=0, index=7)
+    >>> episode.xi.shape, episode.y <= 1.0
+    ((25, 500), True)
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

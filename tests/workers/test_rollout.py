@@ -1,12 +1,13 @@
 """What becomes of an episode whose simulation explodes."""
 
+import doctest
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from workers import setups
+from workers import rollout, setups
 from workers.environments.environment import Channel
 from workers.environments.franka import MODEL
 from workers.environments.tabletop import Tabletop
@@ -84,6 +85,11 @@ def test_the_next_episode_is_untouched_by_a_diverged_one(setup, pair):
             environment.step([float("nan")] * 7)
         after = random_episode(setup, environment, 0, 1)
     assert np.array_equal(after.xi, sane.xi)
+
+
+def test_the_example_in_the_docstring_is_true():
+    assert doctest.testmod(rollout).failed == 0
+    assert doctest.testmod(rollout).attempted == 4
 
 
 def test_a_channel_without_width_is_refused():
