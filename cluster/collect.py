@@ -74,7 +74,7 @@ class Tally:
     def metrics(self) -> dict[str, float]:
         """The tally as numbers for MLflow, by name."""
         seconds = time.monotonic() - self.begin
-        return {
+        values = {
             "episodes": self.episodes,
             "episodes_per_second": self.episodes / max(seconds, 1e-9),
             "badness": self.bad / max(self.episodes, 1),
@@ -85,6 +85,7 @@ class Tally:
             "storage_share": self.storage_seconds / max(self.rollout_seconds + self.storage_seconds, 1e-9),
             "retries": self.retries,
         }
+        return {name: float(value) for name, value in values.items()}
 
 
 def collect(

@@ -77,7 +77,7 @@ def compare(
     with tracker.run(f"compare {setup.name}", "compare", parameters) as run:
         if missing:
             _submit(job, missing, len(grid.keys()), settings, run)
-        return _record(job, run)
+        return _record(job, setup, run)
 
 
 def _plan(
@@ -157,11 +157,11 @@ class _Watch(Callback):
 
     def on_trial_result(
         self,
-        iteration: int,
-        trials: Any,
+        iteration: int,  # noqa: ARG002
+        trials: Any,  # noqa: ARG002
         trial: Any,
         result: dict[str, Any],
-        **info: Any,  # noqa: ARG002
+        **_: Any,
     ) -> None:
         """A trial ended."""
         key = RunKey(**trial.config["run"])
@@ -169,7 +169,7 @@ class _Watch(Callback):
         means = ", ".join(f"{method} {fmean(runs.values()):.2f}" for method, runs in self.best.items())
         self.progress.advance(1, f"best so far: {means}")
 
-    def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **info: Any) -> None:  # noqa: ARG002
+    def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
         """A run ended."""
         key = RunKey(**trial.config["run"])
         with self.parent.child(f"{key.method} {key.run}", {"method": key.method, "run": key.run}) as run:
@@ -181,6 +181,7 @@ def _submit(
     job: ComparisonJob, missing: Sequence[RunKey], total: int, settings: CompareSettings, run: Run
 ) -> None:
     os.environ["TUNE_DISABLE_SIGINT_HANDLER"] = "1"  # Ctrl-C is ours to handle
+    os.environ["RAY_AIR_NEW_OUTPUT"] = "0"  # the new one prints whatever the verbosity
     storage = job.folder / ".ray-tune"
     left = sum(job.length - len(recorded(key.path(job.folder))) for key in missing)
     with ProgressLine("trials", total * job.length, total * job.length - left) as progress:
@@ -211,14 +212,17 @@ def _submit(
         )
 
 
-def _record(job: ComparisonJob, run: Run) -> Summary:
+def _record(job: ComparisonJob, setup: Setup, run: Run) -> Summary:
     summary = summarise(rows(job.folder), Reporting(initial=job.initial), generator(0, "bootstrap", 0))
     table = write_table(job.folder, setup=job.setup, gap=job.gap)
     path = job.folder / "summary.json"
     path.write_text(json.dumps(summary.as_json(), indent=2) + "\n")
     seeds = len({key.run for key, _ in all_runs(job.folder)})
     title = f"{job.setup}: mean of {seeds} runs, 90 % intervals ({job.gap} gap)"
-    for figure in figures.best_so_far(job.folder / "figure", summary, title=title, initial=job.initial):
+    drawn = figures.best_so_far(
+        job.folder / "figure", summary, title=title, initial=job.initial, limits=setup.objective_limits
+    )
+    for figure in drawn:
         run.figure(figure)
     run.file(table)
     run.file(path)

@@ -22,9 +22,19 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#
 _MARKERS = "osD^vP*Xd"
 
 
-def best_so_far(path: Path, summary: Summary, *, title: str, initial: int) -> tuple[Path, Path]:
-    """Mean best objective so far of every method with its interval, as PNG and SVG."""
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+def best_so_far(
+    path: Path, summary: Summary, *, title: str, initial: int, limits: tuple[float, float]
+) -> tuple[Path, Path]:
+    """Mean best objective so far of every method with its interval, as PNG and SVG.
+
+    Args:
+        path: of the figure; its suffix is replaced.
+        summary: what is drawn.
+        title: above it.
+        initial: shared random trials, which are shaded.
+        limits: of the objective; intervals of few runs reach beyond them and are cut there.
+    """
+    figure = Figure(figsize=(7.4, 4.2), layout="constrained")
     axes = figure.subplots()
     trials = np.arange(1, summary.trials + 1)
     axes.axvspan(0.5, initial + 0.5, color="#eeeeee", zorder=0)
@@ -41,7 +51,9 @@ def best_so_far(path: Path, summary: Summary, *, title: str, initial: int) -> tu
         xlabel="trial (the first, shaded, are random and shared)", ylabel="best objective so far", title=title
     )
     axes.set_xlim(0.5, summary.trials + 0.5)
-    axes.legend(frameon=False, fontsize=8)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, limits[0]), min(top, limits[1]))
+    figure.legend(loc="outside right upper", frameon=False, fontsize=8)
     return _write(figure, path)
 
 
@@ -50,7 +62,7 @@ def reconstruction(path: Path, model: SvaeDc, held_out: Episodes, identity: Iden
     order = np.argsort(held_out.y[held_out.rows])
     chosen = order[np.linspace(0, len(order) - 1, 4).astype(int)]
     batch = [held_out.gather(np.array([position]), torch.device("cpu")) for position in chosen]
-    channels = _moving_channels(held_out, len(identity.observation))
+    channels = _moving_channels(held_out, identity)
     figure = Figure(figsize=(11, 7.5), layout="constrained")
     rows = figure.subplots(len(channels), len(batch), sharex=True, squeeze=False)
     with torch.no_grad():
@@ -74,11 +86,15 @@ def reconstruction(path: Path, model: SvaeDc, held_out: Episodes, identity: Iden
     return path
 
 
-def _moving_channels(held_out: Episodes, count: int) -> list[int]:
-    """Four channels spread over the observation: one joint, then what the objects do."""
+def _moving_channels(held_out: Episodes, identity: Identity) -> list[int]:
+    """The channels that move most: one angle, two positions, one part of an orientation, as there are any."""
     spread = held_out.xi[held_out.rows[:256]].std(axis=(0, 2))
-    parts = np.array_split(np.arange(count), 4)
-    return [int(part[np.argmax(spread[part])]) for part in parts]
+    units = np.array([unit for _, unit, _, _ in identity.observation])
+    chosen: list[int] = []
+    for unit, count in (("rad", 1), ("m", 2), ("1", 1)):
+        candidates = np.flatnonzero(units == unit)
+        chosen += candidates[np.argsort(-spread[candidates], kind="stable")][:count].tolist()
+    return chosen
 
 
 def _draw(axes: Axes, curves: Mapping[str, np.ndarray], identity: Identity) -> None:

@@ -5,7 +5,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, TypeVar
 
 import ray
 from ray.exceptions import ActorDiedError, ActorUnavailableError, RayActorError, RayTaskError
@@ -85,7 +85,7 @@ class Pool(Generic[Item, Result]):
         self._await_start()
         self._attempts: Counter[Item] = Counter()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Pool[Item, Result]":
         return self
 
     def __exit__(

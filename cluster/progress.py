@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -32,7 +31,7 @@ class ProgressLine:
         self._bar = _bar(what) if sys.stderr.isatty() else None
         self._task = self._bar.add_task(what, total=total, completed=done, note="") if self._bar else None
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "ProgressLine":
         if self._bar:
             self._bar.start()
         return self

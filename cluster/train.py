@@ -55,7 +55,7 @@ def train(
     session.preflight(settings.workers * job.threads)
     cache = job.data()
     with _run(job, dataset, tracker, settings) as run:
-        _submit(job, settings.workers, session, run)
+        _submit(job, settings.workers, run)
         _record(job, cache, dataset, run)
     return model / MODEL
 
@@ -135,7 +135,7 @@ def _run(job: TrainingJob, dataset: Dataset, tracker: Tracker, settings: TrainSe
         yield run
 
 
-def _submit(job: TrainingJob, workers: int, session: Session, run: Run) -> None:
+def _submit(job: TrainingJob, workers: int, run: Run) -> None:
     storage = job.model / ".ray-train"
     with (
         ProgressLine("updates", _updates(job), _done(job)) as progress,

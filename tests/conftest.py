@@ -42,3 +42,34 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+@pytest.fixture(scope="session")
+def franka_dataset(ray_session, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A real dataset that is just large enough to train on, collected once."""
+    return _collected(240, 40, ray_session, tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def small_dataset(ray_session, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A real dataset of two shards."""
+    return _collected(16, 8, ray_session, tmp_path_factory)
+
+
+def _collected(episodes: int, per_shard: int, session, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from cluster.collect import collect
+    from cluster.config import CollectSettings, TrackingSettings
+    from cluster.tracking import open_tracker
+    from workers import setups
+
+    folder = tmp_path_factory.mktemp("collected")
+    collect(
+        setup=setups.load("franka"),
+        episodes=episodes,
+        folder=folder / "dataset",
+        seed=0,
+        settings=CollectSettings(actors=2, episodes_per_shard=per_shard),
+        session=session,
+        tracker=open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db")),
+    )
+    return folder / "dataset"

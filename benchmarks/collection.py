@@ -1,0 +1,109 @@
+"""What collecting costs beside the rollouts themselves: CPU of Ray and storage, memory of driver and actors.
+
+Prints shares of one run; `--episodes N` changes its length.
+"""
+
+import argparse
+import os
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import psutil
+
+from cluster.collect import collect
+from cluster.config import CollectSettings, RaySettings, TrackingSettings
+from cluster.session import connect
+from cluster.tracking import open_tracker
+from workers import setups
+
+SAMPLE_SECONDS = 0.5
+
+
+class Meter:
+    """CPU seconds and memory of this process and all below it, sampled until `stop`."""
+
+    def __init__(self):
+        self.driver = psutil.Process()
+        self.cpu: dict[int, float] = {}
+        self.first = self.sample()
+        self.driver_rss: list[int] = []
+        self.actor_pss: dict[int, int] = {}
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+
+    def sample(self) -> dict[int, float]:
+        for process in [self.driver, *self.driver.children(recursive=True)]:
+            try:
+                times = process.cpu_times()
+                self.cpu[process.pid] = times.user + times.system
+            except psutil.NoSuchProcess:
+                continue
+        return dict(self.cpu)
+
+    def _watch(self):
+        while not self._ended.wait(SAMPLE_SECONDS):
+            self.sample()
+            self.driver_rss.append(self.driver.memory_info().rss)
+            for process in self.driver.children(recursive=True):
+                try:
+                    if "RolloutActor" in " ".join(process.cmdline()):
+                        pss = process.memory_full_info().pss
+                        self.actor_pss[process.pid] = max(pss, self.actor_pss.get(process.pid, 0))
+                except psutil.NoSuchProcess:
+                    continue
+
+    def stop(self) -> float:
+        """CPU seconds since the meter began, of all processes that were seen."""
+        self._ended.set()
+        self._thread.join()
+        last = self.sample()
+        return sum(seconds - self.first.get(pid, 0.0) for pid, seconds in last.items())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=4096)
+    episodes = parser.parse_args().episodes
+    setup = setups.load("franka")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db"))
+        with connect(RaySettings(num_cpus=os.cpu_count() or 1), address=None) as session:
+            meter = Meter()
+            begin = time.monotonic()
+            dataset = collect(
+                setup=setup,
+                episodes=episodes,
+                folder=folder / "dataset",
+                seed=0,
+                settings=CollectSettings(),
+                session=session,
+                tracker=tracker,
+            )
+            seconds, total = time.monotonic() - begin, meter.stop()
+        [run] = tracker.client.search_runs([tracker.experiment])
+        metrics = run.data.metrics
+        report(episodes, seconds, total, metrics, meter, dataset.size() / episodes)
+
+
+def report(episodes, seconds, total, metrics, meter, size):
+    all_seconds = metrics["core_hours"] * 3600
+    storage = all_seconds * metrics["storage_share"]
+    rollouts = all_seconds - storage
+    half = len(meter.driver_rss) // 2
+    early, late = max(meter.driver_rss[: half or 1]), max(meter.driver_rss[half:])
+    load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
+    print(f"machine: {os.cpu_count()} CPUs, load {load}")
+    print(f"{episodes} episodes in {seconds:.0f} s, {episodes / seconds:.1f}/s; {total:.1f} CPU s in all processes")
+    print(f"rollouts:            {rollouts / total:6.1%} of the CPU time, {rollouts / episodes:.4f} CPU s an episode")
+    print(f"Ray and storage:     {1 - rollouts / total:6.1%} of the CPU time (storage alone {storage / total:.1%})")
+    print(f"memory of an actor:  {max(meter.actor_pss.values()) / 1e6:6.0f} MB (PSS)")
+    print(f"memory of driver:    {early / 1e6:6.0f} MB in the first half, {late / 1e6:.0f} MB in the second (RSS)")
+    print(f"storage:             {size / 1e3:6.2f} kB an episode, lossless")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""The command line as a user meets it: help that teaches, one-line errors, exit codes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def svaedc(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = {name: value for name, value in os.environ.items() if name != "RAY_ADDRESS"}
+    return subprocess.run(
+        [str(Path(sys.executable).parent / "svaedc"), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env=environment,
+    )
+
+
+COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
+
+
+def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
+    result = svaedc("--help", folder=tmp_path)
+    assert result.returncode == 0
+    for command in ("demo", "collect", "train", "compare", "ui", "dataset", "hardware"):
+        assert command in result.stdout
+    loaded = (
+        "import cluster.cli, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"
+    )
+    listed = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
+    assert listed.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ((*COLLECT, "--setup", "frnaka"), 2, "unknown setup 'frnaka'; did you mean 'franka'?"),
+        ((*COLLECT, "--setup", "franka", "--set", "collect.actor=2"), 2, "did you mean 'collect.actors'?"),
+        (
+            (*COLLECT, "--setup", "franka", "--config", "none.yaml"),
+            2,
+            "cannot read the settings file none.yaml",
+        ),
+        (
+            (*COLLECT, "--setup", "franka", "--address", "127.0.0.1:1"),
+            1,
+            "no Ray cluster answers at 127.0.0.1:1",
+        ),
+        (
+            (*COLLECT, "--setup", "franka", "--set", "tracking.uri=sqlite:////proc/none/mlflow.db"),
+            1,
+            "the MLflow store sqlite:////proc/none/mlflow.db cannot be used",
+        ),
+        (("dataset", "info", "nowhere"), 1, "nowhere holds no dataset"),
+        (("dataset", "verify", "nowhere"), 1, "nowhere holds no dataset"),
+        (("hardware", "status", "nowhere"), 1, "nowhere"),
+        (("collect",), 2, "Missing option"),
+    ],
+)
+def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
+    result = svaedc(*arguments, folder=tmp_path)
+    assert result.returncode == code, result.stderr
+    assert message in " ".join(result.stderr.replace("│", " ").split())
+    assert "Traceback" not in result.stderr
+
+
+def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_dataset, tmp_path):
+    info = svaedc("dataset", "info", str(small_dataset), folder=tmp_path)
+    assert info.returncode == 0, info.stderr
+    assert "16 in 2 shards" in info.stdout
+    assert "object_tipped" in info.stdout
+    assert svaedc("dataset", "verify", str(small_dataset), folder=tmp_path).returncode == 0
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    for path in small_dataset.iterdir():
+        if path.is_file():
+            (broken / path.name).write_bytes(path.read_bytes())
+    victim = min(broken.glob("*.parquet"))
+    content = bytearray(victim.read_bytes())
+    content[5000] ^= 1
+    victim.write_bytes(content)
+    result = svaedc("dataset", "verify", str(broken), folder=tmp_path)
+    assert result.returncode == 1
+    assert victim.name in result.stdout
+    assert "recomputes exactly those episodes" in result.stderr
