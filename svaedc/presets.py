@@ -61,8 +61,10 @@ def paper(sizes: Sizes) -> Preset:
 def compact(sizes: Sizes) -> Preset:
     """Ours: low-rank head around the median, MLP prior refitted in a second stage; minutes on two cores.
 
-    Meant for a stride that leaves about 100 steps. On 16,000 Franka episodes it reconstructs at .51 and
-    generates at .61 of the median's error, with all 9 latent dimensions active.
+    Meant for a stride that leaves about 100 steps. On 8,100 Franka episodes (held-out error relative to the
+    median's) it reconstructs at .43 and generates at .73, with all 9 latent dimensions active and
+    correlations of y of .98 and .79. Dropout .3 in stage two beat .1 (.74 against .76 after half the updates)
+    and .5 (.75).
     """
     joint = StageSettings(
         updates=3_000,
@@ -73,7 +75,7 @@ def compact(sizes: Sizes) -> Preset:
         dropout=0.0,
         gradient_norm=1.0,
     )
-    prior = replace(joint, dropout=0.1, weight_decay=1e-2)
+    prior = replace(joint, dropout=0.3, weight_decay=1e-2)
     model = ModelConfig(sizes.controller_dim, sizes.observation_dim, sizes.time_steps)
     return Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["paper"], batch_size=128))
 
