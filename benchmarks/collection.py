@@ -97,11 +97,19 @@ def report(episodes, seconds, total, metrics, meter, size):
     early, late = max(meter.driver_rss[: half or 1]), max(meter.driver_rss[half:])
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
     print(f"machine: {os.cpu_count()} CPUs, load {load}")
-    print(f"{episodes} episodes in {seconds:.0f} s, {episodes / seconds:.1f}/s; {total:.1f} CPU s in all processes")
-    print(f"rollouts:            {rollouts / total:6.1%} of the CPU time, {rollouts / episodes:.4f} CPU s an episode")
-    print(f"Ray and storage:     {1 - rollouts / total:6.1%} of the CPU time (storage alone {storage / total:.1%})")
+    print(
+        f"{episodes} episodes in {seconds:.0f} s, {episodes / seconds:.1f}/s; {total:.1f} CPU s in all processes"
+    )
+    print(
+        f"rollouts:            {rollouts / total:6.1%} of the CPU time, {rollouts / episodes:.4f} CPU s an episode"
+    )
+    print(
+        f"Ray and storage:     {1 - rollouts / total:6.1%} of the CPU time (storage alone {storage / total:.1%})"
+    )
     print(f"memory of an actor:  {max(meter.actor_pss.values()) / 1e6:6.0f} MB (PSS)")
-    print(f"memory of driver:    {early / 1e6:6.0f} MB in the first half, {late / 1e6:.0f} MB in the second (RSS)")
+    print(
+        f"memory of driver:    {early / 1e6:6.0f} MB in the first half, {late / 1e6:.0f} MB in the second (RSS)"
+    )
     print(f"storage:             {size / 1e3:6.2f} kB an episode, lossless")
 
 

@@ -18,6 +18,7 @@ from cluster.options import (
     Overrides,
     Seed,
     SetupName,
+    interruptible,
     settings_of,
     setup_of,
 )
@@ -26,8 +27,6 @@ from cluster.progress import say
 if TYPE_CHECKING:
     from cluster.session import Session
     from cluster.tracking import Tracker
-
-INTERRUPTED = 130
 
 app = typer.Typer(
     name="svaedc",
@@ -49,7 +48,7 @@ def _services(settings: Settings, address: str | None) -> Iterator[tuple["Sessio
     from cluster.tracking import open_tracker
 
     tracker = open_tracker(settings.tracking)
-    with connect(settings.ray, address) as session:
+    with interruptible(), connect(settings.ray, address) as session:
         yield session, tracker
 
 
@@ -200,6 +199,3 @@ def main() -> None:
     except UserError as error:
         say(f"error: {error}")
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        say("interrupted: everything finished is kept, the same command goes on from here")
-        sys.exit(INTERRUPTED)

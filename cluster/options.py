@@ -9,8 +9,12 @@ import typer
 
 from cluster.config import Settings, load_settings
 from cluster.errors import UsageError
+from cluster.progress import say
 from workers import setups
 from workers.setups import Setup
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
 
 Config = Annotated[
     Path | None,
@@ -46,6 +50,16 @@ def setup_of(name: str) -> Setup:
     """The setup of that name; an unknown one is a usage error."""
     with usage_errors():
         return setups.load(name)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Ends a long command that was asked to stop with one sentence and the usual exit code."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit) as stop:
+        say("stopped: everything finished is kept, and the same command goes on from here")
+        raise SystemExit(stop.code if isinstance(stop, SystemExit) else INTERRUPTED) from None
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from cluster.config import HardwareSettings
 from cluster.hardware import operator
 from cluster.hardware.identity import Approval
 from cluster.hardware.status import Status
-from cluster.options import Address, Config, Overrides, Seed, settings_of
+from cluster.options import Address, Config, Overrides, Seed, interruptible, settings_of
 from cluster.progress import say
 
 app = typer.Typer(
@@ -65,7 +65,7 @@ def start(
         pace,
     )
     tracker = open_tracker(settings.tracking)
-    with connect(settings.ray, address) as session:
+    with interruptible(), connect(settings.ray, address) as session:
         last = run_start(settings.hardware, session, tracker, plan, _report, say)
     _show(last)
 

@@ -79,12 +79,12 @@ class EndEffectorWaypoints(Controller):
         turns[0] += 2 * np.pi * np.round((turns[1] - turns[0]) / (2 * np.pi))  # the short way round
         targets = reference(corners, turns, horizon, environment.control_step)
         gains = np.repeat(points[:, 6:], np.diff(ends(horizon, self._waypoints)), axis=0)
-        steps = np.hstack([*targets, gains]).tolist()  # one list per step: few objects to collect
+        steps = np.hstack([*targets, gains])  # as floats, they would fill the caches
         turning, limits = self._turning, self._limits
 
         def command(step: int) -> Sequence[float]:
             state = arm.state
-            row = steps[step]
+            row = steps[step].tolist()
             force = _force(
                 row[_GAINS],
                 row[_POSITION],
@@ -152,8 +152,8 @@ def _torque(
     (fx, fy, fz), (mx, my, mz) = force, moment
     # The arm's joints come first; the fingers behind them have no limits here and are not commanded.
     columns = zip(*jacobian[0], *jacobian[1], gravity, limits, strict=False)
-    torques = [
-        (a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g, limit)
+    return [
+        limit if torque > limit else -limit if torque < -limit else torque
         for a, b, c, d, e, f, g, limit in columns
+        for torque in (a * fx + b * fy + c * fz + d * mx + e * my + f * mz + g,)
     ]
-    return [limit if torque > limit else -limit if torque < -limit else torque for torque, limit in torques]

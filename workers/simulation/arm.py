@@ -13,6 +13,7 @@ from workers.simulation.world import World
 Vector = tuple[float, ...]
 
 _ORIGIN = (0.0, 0.0, 0.0)
+_ANY_LINK, _NO_FLAGS = -2, 0
 _LINK, _DISTANCE = 3, 8  # in a contact point of PyBullet: the first body's link, and the gap in m
 
 
@@ -175,13 +176,15 @@ class Arm:
             self.state.joints + self._finger_rest,
             self.state.speeds + self._finger_rest,
             self._rest,
-            physicsClientId=self._client,
+            _NO_FLAGS,
+            self._client,
         )
 
     def touches(self, body: int) -> bool:
         """Whether any link but the base is in contact with the body."""
-        contacts = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
-        return any(contact[_LINK] >= 0 and contact[_DISTANCE] < 0.0 for contact in contacts)
+        contacts = pybullet.getContactPoints(self.body, body, _ANY_LINK, _ANY_LINK, self._client)
+        # Mostly there are none, and a generator costs as much as the query.
+        return bool(contacts) and any(c[_LINK] >= 0 and c[_DISTANCE] < 0.0 for c in contacts)
 
 
 def _carried(velocity: Vector, spin: Vector, centre: Vector, origin: Vector) -> Vector:
