@@ -18,6 +18,8 @@ from cluster.options import (
     Overrides,
     Seed,
     SetupName,
+    TrainedModel,
+    durable,
     interruptible,
     settings_of,
     setup_of,
@@ -47,6 +49,9 @@ def _services(settings: Settings, address: str | None) -> Iterator[tuple["Sessio
     from cluster.session import connect
     from cluster.tracking import open_tracker
 
+    store = settings.tracking.uri.removeprefix("sqlite:///")
+    if store != settings.tracking.uri:
+        durable(Path(store))
     tracker = open_tracker(settings.tracking)
     with interruptible(), connect(settings.ray, address) as session:
         yield session, tracker
@@ -54,7 +59,9 @@ def _services(settings: Settings, address: str | None) -> Iterator[tuple["Sessio
 
 @app.command()
 def demo(
-    folder: Annotated[Path, typer.Option("--folder", help="Where everything goes.")] = Path("svaedc-demo"),
+    folder: Annotated[Path, typer.Option("--folder", help="Where everything goes.", callback=durable)] = Path(
+        "svaedc-demo"
+    ),
     config: Config = None,
     overrides: Overrides = None,
     address: Address = None,
@@ -63,10 +70,10 @@ def demo(
     from cluster.demo import demo as run_demo
 
     folder.mkdir(parents=True, exist_ok=True)
-    store = f"tracking.uri=sqlite:///{folder.resolve() / 'mlflow.db'}"
+    store = f"tracking.uri=sqlite:///{folder / 'mlflow.db'}"
     settings = settings_of(config, [store, *(overrides or [])])
     with _services(settings, address) as (session, tracker):
-        run_demo(folder.resolve(), settings, session, tracker)
+        run_demo(folder, settings, session, tracker)
 
 
 @app.command()
@@ -130,7 +137,7 @@ def train(
 @app.command()
 def compare(
     setup: SetupName,
-    out: Annotated[Path, typer.Option("--out", help="Folder of the results.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder of the results.", callback=durable)],
     methods: Annotated[str, typer.Option("--methods", help="Names, separated by commas.")] = (
         "random,screened-random,se,svae,svae-dc"
     ),
@@ -139,7 +146,7 @@ def compare(
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
     ] = 20,
     gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
-    model: Annotated[Path | None, typer.Option("--model", help="Folder of a trained model.")] = None,
+    model: TrainedModel = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -199,3 +206,6 @@ def main() -> None:
     except UserError as error:
         say(f"error: {error}")
         sys.exit(error.exit_code)
+    except OSError as error:
+        say(f"error: {error.strerror or error}{f': {error.filename}' if error.filename else ''}")
+        sys.exit(UserError.exit_code)

@@ -16,6 +16,24 @@ from workers.setups import Setup
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
+
+def durable(path: Path | None) -> Path | None:
+    """An absolute path that outlives the command.
+
+    Raises:
+        UsageError: the path is relative inside a submitted job, where it would lie in a temporary copy of the
+            working directory that Ray deletes.
+    """
+    if path is None:
+        return None
+    if not path.is_absolute() and "working_dir_files" in Path.cwd().parts:
+        raise UsageError(
+            f"{path} would be deleted with the job's copy of the working directory; give an absolute path that "
+            "every machine of the cluster sees"
+        )
+    return path.expanduser().absolute()
+
+
 Config = Annotated[
     Path | None,
     typer.Option(
@@ -37,8 +55,11 @@ Address = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
 SetupName = Annotated[str, typer.Option("--setup", help="Robot, controller and task, such as franka.")]
-DatasetFolder = Annotated[Path, typer.Option("--dataset", help="Folder of the dataset.")]
-ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.")]
+DatasetFolder = Annotated[Path, typer.Option("--dataset", help="Folder of the dataset.", callback=durable)]
+ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.", callback=durable)]
+TrainedModel = Annotated[
+    Path | None, typer.Option("--model", help="Folder of a trained model.", callback=durable)
+]
 
 
 def settings_of(config: Path | None, overrides: list[str] | None) -> Settings:

@@ -11,7 +11,7 @@ from cluster.config import HardwareSettings
 from cluster.hardware import operator
 from cluster.hardware.identity import Approval
 from cluster.hardware.status import Status
-from cluster.options import Address, Config, Overrides, Seed, interruptible, settings_of
+from cluster.options import Address, Config, Overrides, Seed, TrainedModel, interruptible, settings_of
 from cluster.progress import say
 
 app = typer.Typer(
@@ -32,7 +32,7 @@ def start(
     folder: Folder,
     robot: Annotated[str, typer.Option("--robot", help="Which robot, such as franka-rehearsal.")],
     method: Annotated[str, typer.Option("--method", help="How controllers are suggested.")] = "svae-dc",
-    model: Annotated[Path | None, typer.Option("--model", help="Folder of a trained model.")] = None,
+    model: TrainedModel = None,
     trials: Annotated[
         int, typer.Option("--trials", min=0, help="Suggested trials, after 2 random ones.")
     ] = 10,

@@ -3,6 +3,7 @@
 import getpass
 import json
 import math
+import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -140,7 +141,7 @@ class Tracker:
         Raises:
             UserError: the store cannot be written.
         """
-        described = {"svaedc.kind": kind, "mlflow.user": getpass.getuser(), **(tags or {})}
+        described = {"svaedc.kind": kind, "mlflow.user": _user(), **(tags or {})}
         texts = [Param(key, str(value)[:PARAMETER_LENGTH]) for key, value in _flat(parameters)]
         with self.reaching():
             run_id = self.client.create_run(self.experiment, tags=described, run_name=name).info.run_id
@@ -174,6 +175,14 @@ def unusable(uri: str, error: Exception) -> UserError:
         f"the MLflow store {uri} cannot be used: {reason}; make it writable and reachable, "
         "or name another with --set tracking.uri=sqlite:///FILE"
     )
+
+
+def _user() -> str:
+    """The user's name; containers often run as a number that has none."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return str(os.getuid())
 
 
 def _ending(kind: type[BaseException] | None) -> str:

@@ -87,3 +87,15 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     assert result.returncode == 1
     assert victim.name in result.stdout
     assert "recomputes exactly those episodes" in result.stderr
+
+
+def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
+    package = tmp_path / "working_dir_files" / "_ray_pkg_1"
+    package.mkdir(parents=True)
+    result = svaedc(*COLLECT, "--setup", "franka", folder=package)
+    assert result.returncode == 2, result.stderr
+    assert "data would be deleted with the job's copy of the working directory" in result.stderr
+    absolute = ("collect", "--episodes", "8", "--dataset", str(tmp_path / "data"), "--setup", "franka")
+    result = svaedc(*absolute, folder=package)
+    assert result.returncode == 2, result.stderr
+    assert "mlflow.db would be deleted" in result.stderr

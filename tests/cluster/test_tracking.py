@@ -206,7 +206,10 @@ def answers(port: int) -> bool:
 
 def browse(page: str, profile: Path) -> str:
     """What a browser shows of a page, once its scripts had time to run."""
-    command = [shutil.which("chromium"), "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("no chromium on PATH; `.ci/run` installs it")
+    command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
     command += ["--no-first-run", "--disable-background-networking", "--disable-component-update"]
     command += ["--disable-sync", "--disable-dev-shm-usage", f"--user-data-dir={profile}"]
     command += ["--window-size=1400,900", "--virtual-time-budget=30000", "--dump-dom", page]
