@@ -35,6 +35,7 @@ class Meter:
         self._thread.start()
 
     def sample(self) -> dict[int, float]:
+        """CPU seconds of every process seen so far; those that ended keep their last."""
         for process in [self.driver, *self.driver.children(recursive=True)]:
             try:
                 times = process.cpu_times()
@@ -95,22 +96,21 @@ def report(episodes, seconds, total, metrics, meter, size):
     rollouts = all_seconds - storage
     half = len(meter.driver_rss) // 2
     early, late = max(meter.driver_rss[: half or 1]), max(meter.driver_rss[half:])
-    load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
-    print(f"machine: {os.cpu_count()} CPUs, load {load}")
+    rows = [
+        ("rollouts / all CPU", rollouts / total, "%", "-"),
+        ("Ray and storage / all CPU", 1 - rollouts / total, "%", "<= 5"),
+        ("storage / all CPU", storage / total, "%", "-"),
+    ]
+    print(f"{episodes} episodes in {seconds:.0f} s, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    for label, share, unit, target in rows:
+        print(f"  {label:<36}{100 * share:8.2f} {unit:<3} target {target}")
+    print(f"  {'CPU of one episode in a rollout':<36}{1e3 * rollouts / episodes:8.2f} ms")
     print(
-        f"{episodes} episodes in {seconds:.0f} s, {episodes / seconds:.1f}/s; {total:.1f} CPU s in all processes"
+        f"  {'memory of a rollout actor (PSS)':<36}{max(meter.actor_pss.values()) / 1e6:8.0f} MB  target <= 260"
     )
-    print(
-        f"rollouts:            {rollouts / total:6.1%} of the CPU time, {rollouts / episodes:.4f} CPU s an episode"
-    )
-    print(
-        f"Ray and storage:     {1 - rollouts / total:6.1%} of the CPU time (storage alone {storage / total:.1%})"
-    )
-    print(f"memory of an actor:  {max(meter.actor_pss.values()) / 1e6:6.0f} MB (PSS)")
-    print(
-        f"memory of driver:    {early / 1e6:6.0f} MB in the first half, {late / 1e6:.0f} MB in the second (RSS)"
-    )
-    print(f"storage:             {size / 1e3:6.2f} kB an episode, lossless")
+    print(f"  {'memory of the driver, first half':<36}{early / 1e6:8.0f} MB (RSS)")
+    print(f"  {'memory of the driver, second half':<36}{late / 1e6:8.0f} MB (RSS)")
+    print(f"  {'one trajectory on disk':<36}{size / 1e3:8.2f} kB  target <= 28")
 
 
 if __name__ == "__main__":

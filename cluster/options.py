@@ -28,8 +28,8 @@ def durable(path: Path | None) -> Path | None:
         return None
     if not path.is_absolute() and "working_dir_files" in Path.cwd().parts:
         raise UsageError(
-            f"{path} would be deleted with the job's copy of the working directory; give an absolute path that "
-            "every machine of the cluster sees"
+            f"{path} would be deleted with the job's copy of the working directory; "
+            "give an absolute path that every machine of the cluster sees"
         )
     return path.expanduser().absolute()
 
