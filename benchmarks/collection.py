@@ -105,9 +105,8 @@ def report(episodes, seconds, total, metrics, meter, size):
     for label, share, unit, target in rows:
         print(f"  {label:<36}{100 * share:8.2f} {unit:<3} target {target}")
     print(f"  {'CPU of one episode in a rollout':<36}{1e3 * rollouts / episodes:8.2f} ms")
-    print(
-        f"  {'memory of a rollout actor (PSS)':<36}{max(meter.actor_pss.values()) / 1e6:8.0f} MB  target <= 260"
-    )
+    pss = max(meter.actor_pss.values()) / 1e6
+    print(f"  {'memory of a rollout actor (PSS)':<36}{pss:8.0f} MB  target <= 260")
     print(f"  {'memory of the driver, first half':<36}{early / 1e6:8.0f} MB (RSS)")
     print(f"  {'memory of the driver, second half':<36}{late / 1e6:8.0f} MB (RSS)")
     print(f"  {'one trajectory on disk':<36}{size / 1e3:8.2f} kB  target <= 28")
