@@ -37,25 +37,29 @@ class Session:
     is_local: bool
     """Whether this command started the cluster, which then ends with it."""
     cpus: int
-    """CPUs of all its machines, busy ones included."""
+    """CPUs of all its machines that were free when it was joined; a submitted job may hold one itself."""
     gpus: int = 0
-    """GPUs of all its machines, busy ones included."""
+    """GPUs of all its machines that were free when it was joined."""
 
     def preflight(self, cpus_required: int) -> None:
-        """Refuses work that the cluster is too small for: Ray would wait for ever, in silence.
+        """Refuses work that the cluster has no room for: Ray would wait for ever, in silence.
 
         Args:
-            cpus_required: CPUs that must exist at the same time, Ray's own overhead included.
+            cpus_required: CPUs that must be free at the same time, Ray's own overhead included.
 
         Raises:
-            UserError: the cluster has fewer.
+            UserError: fewer are free.
         """
-        if cpus_required > self.cpus:
-            larger = f"--set ray.num_cpus={cpus_required}" if self.is_local else "a larger cluster"
-            raise UserError(
-                f"this needs {cpus_required} CPUs at the same time, the cluster at {self.address} has "
-                f"{self.cpus}; ask for fewer workers, or use {larger}"
-            )
+        if cpus_required <= self.cpus:
+            return
+        needed = f"this needs {cpus_required} CPUs at the same time, the cluster at {self.address}"
+        if self.is_local:
+            remedy = f"ask for fewer workers, or use --set ray.num_cpus={cpus_required}"
+            raise UserError(f"{needed} has {self.cpus}; {remedy}")
+        raise UserError(
+            f"{needed} has {self.cpus} free; ask for fewer workers, wait until other work there has ended, "
+            "or use a larger cluster"
+        )
 
 
 @contextmanager
@@ -84,8 +88,8 @@ def connect(settings: RaySettings, address: str | None) -> Iterator[Session]:
 
 
 def _session(*, is_local: bool) -> Session:
-    """Describes the cluster that is connected now."""
-    resources = ray.cluster_resources()
+    """Describes the cluster that is connected now; all of one that was just started is free."""
+    resources = ray.cluster_resources() if is_local else ray.available_resources()
     cpus, gpus = int(resources.get("CPU", 0)), int(resources.get("GPU", 0))
     return Session(ray.get_runtime_context().gcs_address, is_local, cpus, gpus)
 

@@ -23,6 +23,21 @@ except UserError as error:
     print("refused", error)
 """
 
+HOLD = """
+import sys
+import ray
+from cluster.config import RaySettings
+from cluster.session import connect
+class Holder:
+    def ready(self):
+        pass
+with connect(RaySettings(temporary_folder=sys.argv[2]), sys.argv[1]):
+    holder = ray.remote(Holder).options(num_cpus=3).remote()
+    ray.get(holder.ready.remote())
+    print("holding", flush=True)
+    sys.stdin.read()
+"""
+
 
 def join(head, address, **environment) -> str:
     """What a new process prints when it joins, with the given variables and no others about Ray."""
@@ -97,10 +112,30 @@ def test_a_local_cluster_is_reachable_from_this_machine_only(ray_session):
         assert outside.connect_ex(("127.0.0.2", port)) != 0
 
 
+def test_cpus_that_others_hold_are_not_offered(head):
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD, head.address, str(head.folder)],
+        env={**os.environ, "RAY_AUTH_TOKEN": head.token, "HOME": str(head.home)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with holder:
+        assert holder.stdout.readline() == "holding\n"
+        assert join(head, head.address, RAY_AUTH_TOKEN=head.token) == f"joined {head.address} 1 False"
+        holder.stdin.close()
+
+
 def test_preflight_names_what_is_there_and_what_is_missing():
     local = Session("127.0.0.1:6379", is_local=True, cpus=2)
     with pytest.raises(UserError, match=r"needs 3 CPUs .* has 2; .*--set ray\.num_cpus=3"):
         local.preflight(3)
+
+
+def test_preflight_on_a_shared_cluster_advises_to_wait():
+    shared = Session("10.0.0.1:6379", is_local=False, cpus=2)
+    with pytest.raises(UserError, match=r"needs 3 CPUs .* has 2 free; .*wait until other work"):
+        shared.preflight(3)
 
 
 def test_preflight_passes_when_exactly_enough_is_there():
