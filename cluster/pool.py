@@ -3,14 +3,14 @@
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 import ray
-from ray.exceptions import ActorDiedError, ActorUnavailableError, RayActorError, RayTaskError
+from ray.exceptions import RayError, RayTaskError
 
-from cluster.errors import UserError
+from cluster.crew import Crew, Member, full_text, in_one_line
 
 _POLL_SECONDS = 1.0
 
@@ -32,22 +32,17 @@ class Failed(Generic[Item]):
 
     Attributes:
         item: what was attempted.
-        error: why, in words.
+        error: why, in one line.
+        text: all that is known, the traceback in the actor included.
         cause: the exception raised in the actor; None when the actor died or ran out of time.
         attempts_left: the item is tried again unless this is 0.
     """
 
     item: Item
     error: str
+    text: str
     cause: BaseException | None
     attempts_left: int
-
-
-@dataclass
-class _Worker:
-    actor: Any
-    tasks: dict[Any, Any] = field(default_factory=dict)  # object reference -> item, oldest first
-    since: float = 0.0  # when the oldest task began
 
 
 @dataclass(frozen=True)
@@ -58,11 +53,13 @@ class Limits:
         in_flight: items handed to an actor at a time.
         attempts: of one item, before it is given up.
         seconds: of one attempt, before its actor is killed and replaced.
+        start_seconds: without a single actor that is ready for work, before all is given up.
     """
 
     in_flight: int
     attempts: int
     seconds: float
+    start_seconds: float = 300.0
 
 
 class Pool(Generic[Item, Result]):
@@ -78,11 +75,10 @@ class Pool(Generic[Item, Result]):
     def __init__(
         self, *, spawn: Callable[[], Any], submit: Callable[[Any, Item], Any], size: int, limits: Limits
     ) -> None:
-        self._spawn = spawn
         self._submit = submit
         self._limits = limits
-        self._workers = [_Worker(spawn()) for _ in range(size)]
-        self._await_start()
+        self._crew: Crew[Item] = Crew(spawn=spawn, size=size, patience=limits.start_seconds)
+        self._queue: deque[Item] = deque()
         self._attempts: Counter[Item] = Counter()
 
     def __enter__(self) -> "Pool[Item, Result]":
@@ -91,77 +87,72 @@ class Pool(Generic[Item, Result]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for worker in self._workers:
-            ray.kill(worker.actor)
-
-    def _await_start(self) -> None:
-        """Actors that cannot start would fail every item, which is no fault of the items: end at once."""
-        try:
-            ray.get([worker.actor.ready.remote() for worker in self._workers])
-        except ActorDiedError as error:
-            raise UserError(f"a worker process cannot start: {_reason(error)}") from error
+        self._crew.dismiss()
 
     def run(self, items: list[Item]) -> Iterator[Done[Item, Result] | Failed[Item]]:
-        """Yield the outcome of every attempt, in the order they end."""
-        queue = deque(items)
-        while queue or any(worker.tasks for worker in self._workers):
-            self._fill(queue)
+        """Yield the outcome of every attempt, in the order they end.
+
+        Raises:
+            UserError: actors cannot start, which is no fault of the items.
+        """
+        self._queue.extend(items)
+        while self._queue or any(member.tasks for member in self._crew.members):
+            self._crew.tend()
+            self._fill()
             for outcome in [*self._finished(), *self._overdue()]:
                 if isinstance(outcome, Failed) and outcome.attempts_left:
-                    queue.append(outcome.item)
+                    self._queue.append(outcome.item)
                 yield outcome
 
-    def _fill(self, queue: deque[Item]) -> None:
-        for worker in self._workers:
-            while queue and len(worker.tasks) < self._limits.in_flight:
-                item = queue.popleft()
-                if not worker.tasks:
-                    worker.since = time.monotonic()
-                worker.tasks[self._submit(worker.actor, item)] = item
+    def _fill(self) -> None:
+        for member in self._crew.members:
+            while member.is_ready and self._queue and len(member.tasks) < self._limits.in_flight:
+                item = self._queue.popleft()
+                if not member.tasks:
+                    member.since = time.monotonic()
+                member.tasks[self._submit(member.actor, item)] = item
 
     def _finished(self) -> Iterator[Done[Item, Result] | Failed[Item]]:
-        pending = [task for worker in self._workers for task in worker.tasks]
+        pending = self._crew.starting()
+        pending += [task for member in self._crew.members for task in member.tasks]
+        if not pending:
+            time.sleep(_POLL_SECONDS)
+            return
         ready, _ = ray.wait(pending, num_returns=1, timeout=_POLL_SECONDS)
-        for task in ready:
-            worker = next((worker for worker in self._workers if task in worker.tasks), None)
-            if worker is not None:
-                yield from self._outcomes(worker, task)
+        for reference in ready:
+            for member in self._crew.members:
+                if reference in member.tasks:
+                    yield from self._outcomes(member, reference)
+                elif reference == member.starting:
+                    self._crew.welcome(member)
 
-    def _outcomes(self, worker: _Worker, task: Any) -> Iterator[Done[Item, Result] | Failed[Item]]:
+    def _outcomes(self, member: Member[Item], task: Any) -> Iterator[Done[Item, Result] | Failed[Item]]:
         try:
             result = ray.get(task)
         except RayTaskError as error:
-            yield self._failed(self._take(worker, task), str(error.cause or error), error.cause)
-        except (ActorDiedError, ActorUnavailableError) as error:
-            yield from self._replace(worker, f"its worker process died: {_reason(error)}")
+            yield self._failed(self._take(member, task), in_one_line(error), full_text(error), error.cause)
+        except RayError as error:  # its process or machine is gone, or was out of memory
+            died = f"its worker process died: {in_one_line(error)}"
+            yield from self._replace(member, died, full_text(error))
         else:
-            yield Done(self._take(worker, task), result)
+            yield Done(self._take(member, task), result)
 
-    def _take(self, worker: _Worker, task: Any) -> Item:
-        worker.since = time.monotonic()
-        return worker.tasks.pop(task)
+    def _take(self, member: Member[Item], task: Any) -> Item:
+        member.since = time.monotonic()
+        return member.tasks.pop(task)
 
     def _overdue(self) -> Iterator[Failed[Item]]:
-        for worker in self._workers:
-            if worker.tasks and time.monotonic() - worker.since > self._limits.seconds:
-                ray.kill(worker.actor)
-                yield from self._replace(worker, f"took longer than {self._limits.seconds:g} s")
+        for member in self._crew.members:
+            if member.tasks and time.monotonic() - member.since > self._limits.seconds:
+                slow = f"took longer than {self._limits.seconds:g} s"
+                yield from self._replace(member, slow, slow)
 
-    def _replace(self, worker: _Worker, error: str) -> Iterator[Failed[Item]]:
+    def _replace(self, member: Member[Item], error: str, text: str) -> Iterator[Failed[Item]]:
         """A new actor in the place of a lost one; only the item it was working on has failed."""
-        items = list(worker.tasks.values())
-        worker.tasks.clear()
-        worker.actor = self._spawn()
-        worker.since = time.monotonic()
-        yield self._failed(items[0], error, None)
-        for item in items[1:]:
-            worker.tasks[self._submit(worker.actor, item)] = item
+        failed, *waiting = self._crew.replace(member)
+        self._queue.extendleft(reversed(waiting))
+        yield self._failed(failed, error, text, None)
 
-    def _failed(self, item: Item, error: str, cause: BaseException | None) -> Failed[Item]:
+    def _failed(self, item: Item, error: str, text: str, cause: BaseException | None) -> Failed[Item]:
         self._attempts[item] += 1
-        return Failed(item, error, cause, self._limits.attempts - self._attempts[item])
-
-
-def _reason(error: RayActorError) -> str:
-    """The last line of what Ray tells of a dead actor: the exception of a constructor, or how it ended."""
-    return str(error).strip().splitlines()[-1].strip()
+        return Failed(item, error, text, cause, self._limits.attempts - self._attempts[item])

@@ -3,7 +3,10 @@
 import os
 import signal
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import ray
@@ -43,6 +46,24 @@ class Worker:
         time.sleep(600)
 
 
+class Fragile(Worker):
+    """Cannot start twice after an item was attempted, or never again."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        outages = len(list(folder.glob("outage.*")))
+        if list(folder.glob("dies-1.*")) and (outages < 2 or (folder / "for ever").exists()):
+            (folder / f"outage.{outages}").touch()
+            raise OSError("the folder is away")
+
+
+class Holder:
+    """Occupies CPUs."""
+
+    def ready(self) -> None:
+        pass
+
+
 class Unstartable:
     """Has no chance."""
 
@@ -53,16 +74,27 @@ class Unstartable:
         pass
 
 
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def pool_of(spawn: Callable[[], Any], size: int, limits: Limits) -> Pool[str, str]:
+    return Pool(spawn=spawn, submit=lambda worker, item: worker.run.remote(item), size=size, limits=limits)
+
+
 def outcomes(folder: Path, items: list[str], limits: Limits, size: int = 2) -> list[Done | Failed]:
     actor = ray.remote(Worker).options(num_cpus=1)
-    pool = Pool(
-        spawn=lambda: actor.remote(folder),
-        submit=lambda worker, item: worker.run.remote(item),
-        size=size,
-        limits=limits,
-    )
-    with pool:
+    with pool_of(lambda: actor.remote(folder), size, limits) as pool:
         return list(pool.run(items))
+
+
+@contextmanager
+def cpus_held(count: int) -> Iterator[None]:
+    """Somebody else's work on the cluster of four CPUs."""
+    holder = ray.remote(Holder).options(num_cpus=count).remote()
+    ray.get(holder.ready.remote())
+    yield
+    ray.kill(holder)
 
 
 def done(results: list[Done | Failed]) -> list[str]:
@@ -88,7 +120,9 @@ def test_an_item_that_keeps_failing_is_given_up_with_its_error(tmp_path):
     assert done(results) == ["works-0"]
     last = [result for result in results if isinstance(result, Failed)][-1]
     assert last.attempts_left == 0
-    assert last.error == "this item is broken"
+    assert last.error == "ValueError: this item is broken"
+    assert 'raise ValueError("this item is broken")' in last.text
+    assert "\x1b" not in last.text
     assert isinstance(last.cause, ValueError)
     assert len(list(tmp_path.glob("raises-9.*"))) == 3
 
@@ -109,5 +143,60 @@ def test_work_queued_behind_a_dead_worker_is_not_blamed(tmp_path):
 
 def test_actors_that_cannot_start_end_the_work_at_once_with_their_reason():
     actor = ray.remote(Unstartable).options(num_cpus=0)
-    with pytest.raises(UserError, match="cannot start: RuntimeError: there is no robot here"):
-        Pool(spawn=actor.remote, submit=lambda worker, item: worker.run.remote(item), size=1, limits=PATIENT)
+    with (
+        pytest.raises(UserError, match="cannot start: RuntimeError: there is no robot here"),
+        pool_of(actor.remote, 1, PATIENT) as pool,
+    ):
+        list(pool.run(["works-0"]))
+
+
+def test_losing_a_worker_in_any_way_that_ray_knows_is_a_failed_attempt(tmp_path):
+    """A process killed for want of memory is no death of an actor to Ray, nor is that of a task."""
+    crash = ray.remote(die).options(max_retries=0, num_cpus=0)
+    crashes = [crash]
+
+    def submit(worker, item):
+        return crashes.pop().remote() if crashes else worker.run.remote(item)
+
+    actor = ray.remote(Worker).options(num_cpus=1)
+    with Pool(spawn=lambda: actor.remote(tmp_path), submit=submit, size=1, limits=PATIENT) as pool:
+        results = list(pool.run(["works-0"]))
+    assert done(results) == ["works-0"]
+    assert [result.attempts_left for result in results if isinstance(result, Failed)] == [2]
+
+
+def test_workers_without_a_free_cpu_leave_the_work_to_the_others(tmp_path):
+    with cpus_held(3):
+        results = outcomes(tmp_path, ["works0-0", "works1-0", "works2-0"], PATIENT, size=2)
+    assert done(results) == ["works0-0", "works1-0", "works2-0"]
+
+
+def test_no_free_cpu_at_all_ends_the_wait_with_the_reason(tmp_path):
+    hurried = Limits(in_flight=1, attempts=3, seconds=60.0, start_seconds=2.0)
+    with cpus_held(4), pytest.raises(UserError, match=r"could start within 2 s: .* has a CPU free"):
+        outcomes(tmp_path, ["works-0"], hurried)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_replacement_that_cannot_start_yet_costs_no_attempt(tmp_path, capsys):
+    """The only worker dies, and the machine lets nothing start for a while."""
+    limits = Limits(in_flight=2, attempts=2, seconds=1.0)
+    actor = ray.remote(Fragile).options(num_cpus=1)
+    with pool_of(lambda: actor.remote(tmp_path), 1, limits) as pool:
+        results = list(pool.run(["dies-1", "works0-0", "works1-0"]))
+    assert done(results) == ["dies-1", "works0-0", "works1-0"]
+    assert [result.item for result in results if isinstance(result, Failed)] == ["dies-1"]
+    assert len(list(tmp_path.glob("outage.*"))) == 2
+    assert capsys.readouterr().err.count("cannot start yet: OSError: the folder is away") == 1
+
+
+def test_replacements_that_never_start_end_the_work_with_their_reason(tmp_path):
+    limits = Limits(in_flight=1, attempts=2, seconds=60.0, start_seconds=4.0)
+    actor = ray.remote(Fragile).options(num_cpus=1)
+    (tmp_path / "for ever").touch()
+    with (
+        pytest.raises(UserError, match="could start within 4 s: OSError: the folder is away"),
+        pool_of(lambda: actor.remote(tmp_path), 1, limits) as pool,
+    ):
+        list(pool.run(["dies-1", "works-0"]))
+    assert not list(tmp_path.glob("works-0.*"))
