@@ -160,24 +160,20 @@ class Arm:
             self.body, self._hand, 1, 1, self._client
         )
         angles, speeds, _, _ = zip(*joints, strict=True)
+        self._all_angles = angles + self._finger_rest
         return ArmState(angles, speeds, origin, orientation, _carried(velocity, spin, centre, origin), spin)
 
     def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
         """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
-        angles = self.state.joints + self._finger_rest
         return pybullet.calculateJacobian(
-            self.body, self._hand, _ORIGIN, angles, self._rest, self._rest, self._client
+            self.body, self._hand, _ORIGIN, self._all_angles, self._rest, self._rest, self._client
         )
 
     def gravity_torque(self) -> Vector:
         """Torques, in N·m, against gravity, Coriolis and centrifugal forces; the fingers come last."""
+        speeds = self.state.speeds + self._finger_rest
         return pybullet.calculateInverseDynamics(
-            self.body,
-            self.state.joints + self._finger_rest,
-            self.state.speeds + self._finger_rest,
-            self._rest,
-            _NO_FLAGS,
-            self._client,
+            self.body, self._all_angles, speeds, self._rest, _NO_FLAGS, self._client
         )
 
     def touches(self, body: int) -> bool:
