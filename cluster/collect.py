@@ -1,10 +1,9 @@
 """`svaedc collect`: plan the missing shards, submit them to a pool of Ray actors, gather, record."""
 
 import errno
+import socket
 import time
-from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,9 @@ from cluster.config import CollectSettings
 from cluster.errors import UserError
 from cluster.pool import Done, Failed, Limits, Pool
 from cluster.progress import ProgressLine, duration, say
-from cluster.quarantine import put_aside, quarantined, release
+from cluster.quarantine import FOLDER, put_aside, quarantined, release
 from cluster.session import Session
+from cluster.tally import Recorder, Tally
 from cluster.tracking import Run, Tracker
 from workers import setups
 from workers.collection import ShardReport, collect_shard
@@ -25,8 +25,10 @@ from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.setups import Setup
 
-_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}
-_RECORD_SECONDS = 10.0
+_DISK = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
+    *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
+}
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
@@ -37,6 +39,7 @@ class RolloutActor:
     def __init__(self, setup: str, folder: str) -> None:
         self._setup = setups.load(setup)
         self._dataset = open_dataset(Path(folder))
+        self._require_same_code()
 
     def ready(self) -> None:
         """Answers once the process has started and found its dataset."""
@@ -45,47 +48,17 @@ class RolloutActor:
         """One shard, from its first episode to its name in the dataset."""
         return collect_shard(self._setup, self._dataset, shard)
 
-
-@dataclass
-class Tally:
-    """What a collection has done so far."""
-
-    episodes: int = 0
-    size: int = 0
-    diverged: int = 0
-    bad: float = 0.0  # summed over episodes
-    best: float = float("-inf")
-    rollout_seconds: float = 0.0
-    storage_seconds: float = 0.0
-    retries: int = 0
-    errors: dict[Shard, list[str]] = field(default_factory=lambda: defaultdict(list))
-    begin: float = field(default_factory=time.monotonic)
-
-    def add(self, report: ShardReport) -> None:
-        """Count a finished shard."""
-        self.episodes += report.shard.episodes
-        self.size += report.size
-        self.diverged += report.diverged
-        self.bad += report.badness * report.shard.episodes
-        self.best = max(self.best, report.best)
-        self.rollout_seconds += report.rollout_seconds
-        self.storage_seconds += report.storage_seconds
-
-    def metrics(self) -> dict[str, float]:
-        """The tally as numbers for MLflow, by name."""
-        seconds = time.monotonic() - self.begin
-        values = {
-            "episodes": self.episodes,
-            "episodes_per_second": self.episodes / max(seconds, 1e-9),
-            "badness": self.bad / max(self.episodes, 1),
-            "best_objective": self.best,
-            "diverged": self.diverged,
-            "bytes_per_episode": self.size / max(self.episodes, 1),
-            "core_hours": (self.rollout_seconds + self.storage_seconds) / 3600,
-            "storage_share": self.storage_seconds / max(self.rollout_seconds + self.storage_seconds, 1e-9),
-            "retries": self.retries,
-        }
-        return {name: float(value) for name, value in values.items()}
+    def _require_same_code(self) -> None:
+        """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""
+        asked = self._dataset.identity
+        own = identity_of(self._setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard)
+        differences = asked.differences(own)
+        if differences:
+            raise ValueError(
+                f"the machine {socket.gethostname()} would roll out other episodes than "
+                f"{self._dataset.folder} holds; the two differ in {'; '.join(differences)}. "
+                "Install the same svaedc and libraries on every machine"
+            )
 
 
 def collect(
@@ -120,8 +93,8 @@ def collect(
     with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
         tally = Tally()
         with _pool(dataset, settings, actors) as pool:
-            _gather(pool.run(plan), dataset, episodes, tally, run)
-        _record(dataset, tally, run)
+            _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+        _record(dataset, episodes, tally, run)
     return dataset
 
 
@@ -153,45 +126,47 @@ def _pool(dataset: Dataset, settings: CollectSettings, actors: int) -> Pool[Shar
     )
 
 
-def _gather(outcomes: Iterable[Outcome], dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
-    recorded = time.monotonic()
-    with ProgressLine("episodes", episodes, episodes - _left(dataset, episodes)) as progress:
+def _gather(
+    outcomes: Iterable[Outcome], dataset: Dataset, episodes: int, tally: Tally, recorder: Recorder
+) -> None:
+    left = sum(shard.episodes for shard in dataset.missing(episodes))
+    with ProgressLine("episodes", episodes, episodes - left) as progress:
         for outcome in outcomes:
             if isinstance(outcome, Failed):
                 _note_failure(outcome, dataset, tally)
                 continue
             tally.add(outcome.result)
-            release(dataset.folder, outcome.item)
             progress.advance(outcome.item.episodes, f"bad {tally.metrics()['badness']:.2f}")
-            if time.monotonic() - recorded > _RECORD_SECONDS:
-                recorded = time.monotonic()
-                run.metrics(tally.metrics(), step=tally.episodes)
-
-
-def _left(dataset: Dataset, episodes: int) -> int:
-    return sum(shard.episodes for shard in dataset.missing(episodes))
+            recorder.record(tally)
 
 
 def _note_failure(failure: Failed[Shard], dataset: Dataset, tally: Tally) -> None:
     if isinstance(failure.cause, OSError) and failure.cause.errno in _DISK:
-        raise UserError(
-            f"cannot write to {dataset.folder}: {failure.cause.strerror}. "
-            f"The {dataset.episodes()} episodes in it are safe; make room and run the same command again"
-        )
-    tally.errors[failure.item].append(failure.error)
+        raise _unwritable(dataset, failure.cause)
+    tally.errors[failure.item].append(failure.text)
     if failure.attempts_left:
         tally.retries += 1
         say(f"{failure.item.name} failed and is tried again: {failure.error}")
-    else:
-        path = put_aside(dataset.folder, failure.item, tally.errors[failure.item])
-        say(f"{failure.item.name} was given up, its errors are in {path}: {failure.error}")
+        return
+    try:
+        path = put_aside(dataset, failure.item, tally.errors[failure.item])
+    except OSError as error:
+        raise _unwritable(dataset, error) from error
+    say(f"{failure.item.name} was given up, its errors are in {path}: {failure.error}")
 
 
-def _record(dataset: Dataset, tally: Tally, run: Run) -> None:
+def _unwritable(dataset: Dataset, error: OSError) -> UserError:
+    return UserError(
+        f"cannot write to {dataset.folder}: {error.strerror}. The shards in it are safe; make room or "
+        "repair the disk, and run the same command again"
+    )
+
+
+def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
+    """Say first how it went: the store may fail."""
     shards.sweep(dataset.folder)
+    release(dataset)
     metrics = tally.metrics()
-    run.metrics(metrics, step=tally.episodes)
-    run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
     say(
         f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
         f"{tally.episodes} new in {duration(time.monotonic() - tally.begin)} "
@@ -199,9 +174,11 @@ def _record(dataset: Dataset, tally: Tally, run: Run) -> None:
         f"mean badness {metrics['badness']:.2f}, {tally.diverged} diverged, {tally.retries} retries; "
         f"{run.url}"
     )
-    left = quarantined(dataset.folder)
+    run.metrics(metrics, step=tally.episodes)
+    run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
+    left = quarantined(dataset, episodes)
     if left:
         raise UserError(
-            f"{len(left)} shards kept failing, {left[0]} among them; their errors are in "
-            f"{dataset.folder / 'quarantine'}, and the same command tries them again"
+            f"{len(left)} shards kept failing, {left[0].name} among them; their errors are in "
+            f"{dataset.folder / FOLDER}, and the same command tries them again"
         )

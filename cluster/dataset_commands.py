@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
@@ -12,7 +11,8 @@ from cluster.errors import UserError
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
-from workers.dataset.verification import verify
+from workers.dataset.statistics import Statistics, statistics
+from workers.dataset.verification import gaps, verify
 
 app = typer.Typer(no_args_is_help=True, help="Look into a dataset, or prove that it is whole.")
 
@@ -44,10 +44,10 @@ def info(folder: Folder) -> None:
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
         "made with": f"pybullet {identity.pybullet}, numpy {identity.numpy}",
-        "put aside": ", ".join(quarantined(folder)) or "none",
+        "put aside": ", ".join(shard.name for shard in quarantined(dataset)) or "none",
     }
     try:
-        rows |= _statistics(dataset)
+        rows |= _described(statistics(dataset)) if episodes else {}
     except ValueError as error:
         raise UserError(
             f"{error}; `svaedc dataset verify {folder}` lists everything that is wrong"
@@ -57,40 +57,38 @@ def info(folder: Folder) -> None:
     Console().print(table)
 
 
-def _statistics(dataset: Dataset) -> dict[str, str]:
-    f, y, bits, diverged = [], [], [], 0
-    for _, columns in dataset.batches():
-        f.append(columns.f)
-        y.append(columns.y)
-        diverged += sum(stop != "" for stop in columns.stop)
-        bits.append([(columns.bad >> bit & 1).mean() for bit in range(len(dataset.identity.conditions))])
-    if not f:
-        return {}
-    marks = (0, 0.05, 0.25, 0.5, 0.75, 0.95, 1)
-    shares = zip(dataset.identity.conditions, np.mean(bits, axis=0), strict=True)
+def _described(found: Statistics) -> dict[str, str]:
     return {
-        "objective": "  ".join(f"{value:+.2f}" for value in np.quantile(np.concatenate(f), marks))
+        "objective": "  ".join(f"{value:+.2f}" for value in found.objective)
         + "  (min, 5, 25, 50, 75, 95 %, max)",
-        "badness": f"{np.concatenate(y).mean():.3f} on average",
-        "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in shares),
-        "diverged": str(diverged),
+        "badness": f"{found.badness:.3f} on average",
+        "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
+        "diverged": str(found.diverged),
     }
 
 
 @app.command(name="verify")
 def verify_command(folder: Folder) -> None:
-    """Check every byte and row; exits with 1 and names each broken file. Changes nothing."""
+    """Check every byte and row; exits with 1, names each broken file and each gap. Changes nothing."""
     dataset = _opened(folder)
     found = []
     with ProgressLine("episodes", dataset.episodes(), 0) as progress:
         for shard, problems in verify(dataset):
             found += problems
             progress.advance(shard.episodes, f"{len(found)} problems")
+    uncollected = list(gaps(dataset))
     for problem in found:
         typer.echo(f"{problem.file}: {problem.what}")
+    for gap in uncollected:
+        typer.echo(f"episodes {gap.start} to {gap.stop - 1} are not collected yet")
     if found:
         raise UserError(
             f"{len(found)} problems in {folder}; delete the files named above and their .sha256, and run "
             "`svaedc collect` again: it recomputes exactly those episodes"
+        )
+    if uncollected:
+        raise UserError(
+            f"every file in {folder} is whole, but episodes between them are not collected yet; "
+            "run `svaedc collect` again: it collects exactly those"
         )
     typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")

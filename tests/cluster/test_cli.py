@@ -1,6 +1,7 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -99,3 +100,15 @@ def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
     result = svaedc(*absolute, folder=package)
     assert result.returncode == 2, result.stderr
     assert "mlflow.db would be deleted" in result.stderr
+
+
+def test_a_gap_is_told_from_damage_and_condemns_no_file(small_dataset, tmp_path):
+    gappy = tmp_path / "gappy"
+    shutil.copytree(small_dataset, gappy)
+    min(gappy.glob("*.parquet")).unlink()
+    result = svaedc("dataset", "verify", str(gappy), folder=tmp_path)
+    assert result.returncode == 1
+    assert result.stdout == "episodes 0 to 7 are not collected yet\n"
+    assert "every file in" in result.stderr
+    assert "delete" not in result.stderr
+    assert svaedc("dataset", "info", str(gappy), folder=tmp_path).returncode == 0

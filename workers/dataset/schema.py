@@ -21,6 +21,23 @@ _SPLIT = ["x.list.element", "xi.list.element", "y", "f"]
 
 
 @dataclass(frozen=True)
+class Outcomes:
+    """How episodes went, without their trajectories, in the order of the file.
+
+    Attributes:
+        bad: bits of the bad conditions per step.
+        y: badness.
+        f: objective.
+        stop: stop reason of each, "" for none.
+    """
+
+    bad: UInt8[np.ndarray, "n time"]
+    y: Float32[np.ndarray, " n"]
+    f: Float32[np.ndarray, " n"]
+    stop: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Columns:
     """Episodes as arrays, in the order of the file.
 
@@ -125,10 +142,7 @@ def read(path: Path, identity: Identity) -> Columns:
     Raises:
         ValueError: when the file is damaged or not of this schema.
     """
-    with _damage_named(path):
-        table = pq.ParquetFile(path, page_checksum_verification=True).read()
-    if not table.schema.equals(schema(identity)):
-        raise ValueError(f"{path} has other columns than schema version {identity.schema_version}")
+    table = _table(path, identity, schema(identity).names)
     shape = (len(identity.observation), identity.horizon)
     return Columns(
         episode=table["episode"].to_numpy(),
@@ -140,6 +154,30 @@ def read(path: Path, identity: Identity) -> Columns:
         stop=tuple(table["stop"].to_pylist()),
         physics={name: pc.struct_field(table["physics"], name).to_numpy() for name in identity.physics},
     )
+
+
+def read_outcomes(path: Path, identity: Identity) -> Outcomes:
+    """How the episodes of a file went; the large columns are not read.
+
+    Raises:
+        ValueError: when a part that is read is damaged, or the file is not of this schema.
+    """
+    table = _table(path, identity, ["bad", "y", "f", "stop"])
+    return Outcomes(
+        bad=_dense(table["bad"], (identity.horizon,)),
+        y=table["y"].to_numpy(),
+        f=table["f"].to_numpy(),
+        stop=tuple(table["stop"].to_pylist()),
+    )
+
+
+def _table(path: Path, identity: Identity, names: list[str]) -> pa.Table:
+    """Columns of a file, every page of them checked against its checksum."""
+    with _damage_named(path):
+        file = pq.ParquetFile(path, page_checksum_verification=True)
+        if not file.schema_arrow.equals(schema(identity)):
+            raise ValueError(f"{path} has other columns than schema version {identity.schema_version}")
+        return file.read(columns=names)
 
 
 def read_stops(path: Path) -> tuple[str, ...]:

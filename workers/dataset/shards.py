@@ -37,8 +37,14 @@ class Shard:
 
 def present(folder: Path) -> list[Shard]:
     """The finished shards of a dataset, in order."""
-    matches = (_NAME.fullmatch(path.name) for path in folder.iterdir())
-    return sorted(Shard(int(match[1]), int(match[2])) for match in matches if match)
+    return sorted(shard for path in folder.iterdir() for shard in named(path.name))
+
+
+def named(name: str) -> Iterator[Shard]:
+    """The shard that a file name stands for; none for a name of another kind."""
+    match = _NAME.fullmatch(name)
+    if match:
+        yield Shard(int(match[1]), int(match[2]))
 
 
 def missing(shards: Iterable[Shard], episodes: int, per_shard: int) -> Iterator[Shard]:

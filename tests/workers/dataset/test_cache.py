@@ -132,3 +132,13 @@ def test_two_processes_that_build_at_once_end_with_one_cache(dataset, tmp_path):
     expected = float(training_cache(dataset, 5, tmp_path / "alone").xi.sum())
     assert printed == [str(expected)] * 2
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_numbers_that_are_not_finite_are_refused_by_shard_and_episode(tmp_path, identity, episodes_of):
+    dataset = create(tmp_path / "dataset", identity)
+    rows = episodes_of(identity, range(8))
+    rows[5].xi[1, 9] = np.nan
+    shards.commit(dataset.folder, Shard(0, 8), lambda path: schema.write(path, identity, 0, rows))
+    with pytest.raises(ValueError, match=r"-000000008\.parquet holds NaN or infinity in xi of episode 5"):
+        training_cache(dataset, 5, tmp_path / "cache")
+    assert list((tmp_path / "cache").iterdir()) == []

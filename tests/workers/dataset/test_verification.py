@@ -8,7 +8,7 @@ import pytest
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard
-from workers.dataset.verification import verify
+from workers.dataset.verification import gaps, verify
 
 MIDDLE = Shard(8, 16)
 
@@ -64,9 +64,21 @@ def test_a_missing_digest_is_named(dataset):
     assert _problems(dataset) == {MIDDLE.name: "its .sha256 file is missing"}
 
 
-def test_a_gap_is_named(dataset):
+def test_a_gap_is_nobodys_fault(dataset):
+    assert list(gaps(dataset)) == []
     dataset.path(MIDDLE).unlink()
-    assert _problems(dataset) == {Shard(16, 20).name: "episodes 8 to 15 before it are missing"}
+    assert list(gaps(dataset)) == [MIDDLE]
+    assert _problems(dataset) == {}
+
+
+def test_gaps_and_shards_together_are_every_episode_once(dataset, fill):
+    for shard in (Shard(0, 8), MIDDLE):
+        dataset.path(shard).unlink()
+    assert list(gaps(dataset)) == [Shard(0, 16)]
+    fill(dataset, 40)
+    for shard in (MIDDLE, Shard(20, 24), Shard(24, 32)):
+        dataset.path(shard).unlink()
+    assert list(gaps(dataset)) == [MIDDLE, Shard(20, 32)]
 
 
 def test_an_overlap_is_named(dataset, identity, episodes_of):
@@ -102,7 +114,7 @@ def test_a_shard_renamed_to_other_episodes_is_named(dataset, identity, episodes_
     dataset.path(Shard(20, 24)).rename(dataset.path(Shard(24, 28)))
     found = _problems(dataset)[Shard(24, 28).name]
     assert "its rows are not the episodes 24 to 27" in found
-    assert "episodes 20 to 23 before it are missing" in found
+    assert list(gaps(dataset)) == [Shard(20, 24)]
 
 
 def test_badness_that_is_not_the_mean_of_the_bad_steps_is_named(dataset, identity, episodes_of):

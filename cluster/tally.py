@@ -1,0 +1,87 @@
+"""What a collection has done so far, and its record in MLflow while it goes on."""
+
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+from cluster.errors import UserError
+from cluster.progress import say
+from cluster.tracking import Run
+from workers.collection import ShardReport
+from workers.dataset.shards import Shard
+
+RECORD_SECONDS = 10.0
+
+
+@dataclass
+class Tally:
+    """Counts and sums over the shards that this command has collected."""
+
+    episodes: int = 0
+    size: int = 0
+    diverged: int = 0
+    bad: float = 0.0  # summed over episodes
+    best: float = float("-inf")
+    rollout_seconds: float = 0.0
+    storage_seconds: float = 0.0
+    retries: int = 0
+    errors: dict[Shard, list[str]] = field(default_factory=lambda: defaultdict(list))
+    begin: float = field(default_factory=time.monotonic)
+
+    def add(self, report: ShardReport) -> None:
+        """Count a finished shard."""
+        self.episodes += report.shard.episodes
+        self.size += report.size
+        self.diverged += report.diverged
+        self.bad += report.badness * report.shard.episodes
+        self.best = max(self.best, report.best)
+        self.rollout_seconds += report.rollout_seconds
+        self.storage_seconds += report.storage_seconds
+
+    def metrics(self) -> dict[str, float]:
+        """The tally as numbers for MLflow, by name."""
+        seconds = time.monotonic() - self.begin
+        values = {
+            "episodes": self.episodes,
+            "episodes_per_second": self.episodes / max(seconds, 1e-9),
+            "badness": self.bad / max(self.episodes, 1),
+            "best_objective": self.best,
+            "diverged": self.diverged,
+            "bytes_per_episode": self.size / max(self.episodes, 1),
+            "core_hours": (self.rollout_seconds + self.storage_seconds) / 3600,
+            "storage_share": self.storage_seconds / max(self.rollout_seconds + self.storage_seconds, 1e-9),
+            "retries": self.retries,
+        }
+        return {name: float(value) for name, value in values.items()}
+
+
+@dataclass
+class Recorder:
+    """Records a tally now and then; a store that fails meanwhile must not end hours of work.
+
+    Attributes:
+        run: the MLflow run.
+        interval: seconds between records; doubled by every failure, for each may last minutes.
+    """
+
+    run: Run
+    interval: float = RECORD_SECONDS
+    _due: float = field(init=False)
+    _has_failed: bool = field(init=False, default=False)
+
+    def __post_init__(self) -> None:
+        """Begin the first interval."""
+        self._due = time.monotonic() + self.interval
+
+    def record(self, tally: Tally) -> None:
+        """Record the tally if its time has come; the first failure is said."""
+        if time.monotonic() < self._due:
+            return
+        try:
+            self.run.metrics(tally.metrics(), step=tally.episodes)
+        except UserError as error:
+            self.interval *= 2
+            if not self._has_failed:
+                say(f"{error}; the collection goes on, and its numbers are recorded at the end at the latest")
+            self._has_failed = True
+        self._due = time.monotonic() + self.interval

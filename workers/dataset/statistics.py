@@ -1,0 +1,57 @@
+"""What the episodes of a dataset are like: objective, badness, and how often each condition is bad."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from workers.dataset.folder import Dataset
+from workers.dataset.schema import read_outcomes
+
+MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""The quantiles that describe the objective."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Every episode counts alike, in whatever file it is; the diverged ones count as entirely bad.
+
+    Attributes:
+        objective: quantiles of f at `MARKS`.
+        badness: mean y, in [0, 1].
+        bad_steps: the share of steps in which each condition was bad, by its name.
+        diverged: how many episodes diverged.
+    """
+
+    objective: Float64[np.ndarray, " marks"]
+    badness: float
+    bad_steps: Mapping[str, float]
+    diverged: int
+
+
+def statistics(dataset: Dataset) -> Statistics:
+    """Describe the episodes of a dataset, without reading their trajectories.
+
+    Raises:
+        ValueError: the dataset has no episodes, or a damaged file.
+    """
+    objectives, badness, diverged, steps = [], 0.0, 0, 0
+    bad = np.zeros(len(dataset.identity.conditions))
+    bits = np.arange(len(dataset.identity.conditions), dtype=np.uint8)
+    for shard in dataset.shards():
+        outcomes = read_outcomes(dataset.path(shard), dataset.identity)
+        objectives.append(outcomes.f)
+        badness += float(outcomes.y.sum(dtype=np.float64))
+        diverged += sum(stop != "" for stop in outcomes.stop)
+        bad += (outcomes.bad[..., None] >> bits & 1).sum(axis=(0, 1))
+        steps += outcomes.bad.size
+    if not objectives:
+        raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
+    f = np.concatenate(objectives).astype(np.float64)
+    return Statistics(
+        objective=np.quantile(f, MARKS),
+        badness=badness / len(f),
+        bad_steps=dict(zip(dataset.identity.conditions, (bad / steps).tolist(), strict=True)),
+        diverged=diverged,
+    )
