@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from workers.environments.environment import Channel, Observed
+from workers.rollout import diverged_objective, sane_steps
 from workers.setups import Setup
 
 
@@ -20,9 +21,11 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     | observation | ξ at this step: the setup's observation channels, in their units |
     | reward | 0 in every step but the last, where it is f over the whole episode |
     | start | the setup's start pose; physics drawn from the ranges of data collection |
-    | end | truncated after the setup's horizon |
+    | end | truncated after the setup's horizon; terminated when the simulation explodes |
 
-    `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's `physics`.
+    An episode that explodes is bad, ends with its last sane observation and has f's lower limit for a reward,
+    as in a rollout. `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's
+    `physics`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -33,6 +36,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = self._seen
         self.action_space = self._commands
         self._records: list[Any] = []
+        self._last = self._seen.low
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -43,16 +47,21 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._environment.reset(physics)
         self._records = []
         observed = self._environment.observed([self._environment.record()])
-        return self._row(observed), {"physics": physics, "bad": bool(self._setup.task.is_bad(observed).any())}
+        self._last = self._row(observed)
+        return self._last, {"physics": physics, "bad": bool(self._setup.task.is_bad(observed).any())}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply one command for one control step."""
         command: Sequence[float] = np.clip(action, self._commands.low, self._commands.high).tolist()
-        self._records.append(self._environment.step(command))
-        observed = self._environment.observed(self._records[-1:])
+        record = self._environment.step(command)
+        observed = self._environment.observed([record])
+        if not sane_steps(observed.xi, self._setup.observation):
+            return self._last, diverged_objective(self._setup), True, False, {"bad": True}
+        self._records.append(record)
+        self._last = self._row(observed)
         ended = len(self._records) >= self._setup.horizon
         bad = bool(self._setup.task.is_bad(observed).any())
-        return self._row(observed), self._objective() if ended else 0.0, False, ended, {"bad": bad}
+        return self._last, self._objective() if ended else 0.0, False, ended, {"bad": bad}
 
     def close(self) -> None:
         """End the simulation."""

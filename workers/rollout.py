@@ -77,7 +77,7 @@ def random_episode(setup: Setup, environment: Environment, seed: int, index: int
 
 
 def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) -> Episode:
-    sane = _sane_steps(observed.xi, setup.observation)
+    sane = sane_steps(observed.xi, setup.observation)
     if sane < setup.horizon:
         return _diverged(setup, observed, sane, x, physics)
     is_bad = setup.task.is_bad(observed)
@@ -100,11 +100,16 @@ def _diverged(setup: Setup, observed: Observed, sane: int, x: np.ndarray, physic
     else:
         xi[:, sane:] = xi[:, sane - 1 : sane]
     bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
-    return Episode(x, xi, bad, 1.0, float(np.float32(setup.objective_limits[0])), DIVERGED, physics)
+    return Episode(x, xi, bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
-def _sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...]) -> int:
-    """How many steps pass before a channel leaves its bounds or is not a number."""
+def diverged_objective(setup: Setup) -> float:
+    """The objective of an episode whose simulation exploded: the lower limit of f."""
+    return float(np.float32(setup.objective_limits[0]))
+
+
+def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...]) -> int:
+    """How many steps pass before a channel leaves its bounds or is not a number: the simulation exploded."""
     slack = 1e-5  # float32 rotation matrices
     low = np.array([channel.low for channel in channels], dtype=np.float32)[:, None] - slack
     high = np.array([channel.high for channel in channels], dtype=np.float32)[:, None] + slack

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-import pybullet
 import pybullet_data
 
+from workers.simulation.bullet import pybullet
 from workers.simulation.world import World
 
 Vector = tuple[float, ...]

@@ -1,7 +1,6 @@
 """A solid cylinder that stands on the ground and may be pushed over."""
 
-import pybullet
-
+from workers.simulation.bullet import pybullet
 from workers.simulation.world import World
 
 _MARGIN = 1e-3  # m; Bullet keeps this gap, so a body set down without it jumps

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from types import TracebackType
 
-import pybullet
+from workers.simulation.bullet import pybullet
 
 GRAVITY = -9.81  # m/s²
 _STATIC = (2, -3)  # Bullet's own collision group and mask of fixed bases
