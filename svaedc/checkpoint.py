@@ -72,7 +72,11 @@ def require(path: Path, found: dict[str, Any], expected: dict[str, Any]) -> None
 
 
 def write(path: Path, content: dict[str, Any]) -> None:
-    """Write plain values and tensors to `path` atomically: temporary file, fsync, rename."""
+    """Write plain values and tensors to `path` atomically: temporary file, fsync, rename.
+
+    Raises:
+        OSError: It cannot be written, for example on a full disk; an older file at `path` stays as it was.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("wb") as file:
@@ -80,6 +84,12 @@ def write(path: Path, content: dict[str, Any]) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
+    except (OSError, RuntimeError) as error:
+        # Torch hides what the file said behind an error of its own archive writer.
+        cause = error if isinstance(error, OSError) else error.__context__
+        if not isinstance(cause, OSError):
+            raise
+        raise OSError(cause.errno, f"cannot write a checkpoint: {cause.strerror}", str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
     folder = os.open(path.parent, os.O_RDONLY)

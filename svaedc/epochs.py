@@ -62,11 +62,7 @@ class Run:
 
     def load(self, state: TrainingState) -> None:
         """Put saved weights into the model."""
-        if state["settings"] != self.settings.to_dict():
-            raise ValueError(
-                "training can only resume with its own settings, but "
-                f"{_difference(state['settings'], self.settings)}; start a new run to change them"
-            )
+        require_settings(state, self.settings)
         self.model.load_state_dict(state["model"])
 
     def budget(self, stage: str) -> int:
@@ -167,8 +163,24 @@ class Loop:
         )
 
 
-def _difference(saved: dict[str, Any], settings: TrainingSettings) -> str:
-    """First setting that differs, with both values."""
-    current = settings.to_dict()
-    name = next(name for name in sorted(current) if saved.get(name) != current[name])
-    return f"{name} was {saved.get(name)}, is {current[name]}"
+def require_settings(state: TrainingState, settings: TrainingSettings) -> None:
+    """Refuse to go on from a state of other settings.
+
+    Raises:
+        ValueError: A setting differs; it is named with both values.
+    """
+    saved, current = _flat(state["settings"]), _flat(settings.to_dict())
+    for name, value in current.items():
+        if saved.get(name) != value:
+            raise ValueError(
+                f"training can only resume with its own settings, but {name} was {saved.get(name)}, "
+                f"is {value}; start a new run to change it"
+            )
+
+
+def _flat(settings: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested settings under dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {f"{prefix}{name}": value}
+    return flat

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 from torch import nn
 
 from svaedc.episodes import Episodes
-from svaedc.epochs import STAGES, EpochReport, Loop, Run, TrainingState
+from svaedc.epochs import STAGES, EpochReport, Loop, Run, TrainingState, require_settings
 from svaedc.model import SvaeDc
 from svaedc.sampling import ALONE, Shard
 from svaedc.settings import TrainingSettings
 
-__all__ = ["EpochReport", "TrainingState", "fit"]
+__all__ = ["EpochReport", "TrainingState", "fit", "require_settings"]
 
 
 def _unchanged(module: nn.Module) -> nn.Module:

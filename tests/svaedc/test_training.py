@@ -89,6 +89,8 @@ def test_resuming_with_other_settings_is_refused_with_both_values(model, halves)
     state = next(fit(model, *halves, SHORT)).state
     with pytest.raises(ValueError, match="batch_size was 32, is 16; start a new run"):
         next(fit(model, *halves, replace(SHORT, batch_size=16), resume=state))
+    with pytest.raises(ValueError, match=r"joint\.updates was 25, is 30; start a new run"):
+        next(fit(model, *halves, SHORT.with_updates(30, 22), resume=state))
 
 
 def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves):

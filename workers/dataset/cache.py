@@ -56,7 +56,7 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
 
     Raises:
         ValueError: when the stride does not fit the horizon, or the dataset is empty, damaged, or holds
-            episodes twice.
+            episodes twice or numbers that are not finite.
         OSError: when the disk is too small; the error names both sizes.
     """
     if not 1 <= stride <= dataset.identity.horizon:
@@ -107,7 +107,7 @@ def require_space(needed: int, free: int, folder: Path) -> None:
         raise OSError(
             errno.ENOSPC,
             f"the training cache needs {needed / 1e9:.2f} GB below {folder}, only {free / 1e9:.2f} GB are "
-            "free; free some, choose another folder (train.cache), or a larger stride (train.stride)",
+            "free; free some, choose another folder (train.cache_folder), or a larger stride (train.stride)",
         )
 
 
@@ -139,8 +139,9 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
         for name, (kind, shape) in layout.items()
     }
     filled = 0
-    for _, columns in dataset.batches():
+    for shard, columns in dataset.batches():
         rows = _sampled(columns, stride, dataset.identity.horizon // stride)
+        _require_finite(rows, dataset.path(shard))
         size = len(rows["episode"])
         for name, values in rows.items():
             arrays[name][filled : filled + size] = values
@@ -160,3 +161,14 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
         "y": columns.y[sane],
         "f": columns.f[sane],
     }
+
+
+def _require_finite(rows: Mapping[str, np.ndarray], path: Path) -> None:
+    """Refuse what would turn the model's every weight into NaN many updates later."""
+    for name in ("x", "xi", "y", "f"):
+        strange = ~np.isfinite(rows[name]).reshape(len(rows[name]), -1).all(axis=1)
+        if strange.any():
+            raise ValueError(
+                f"{path.name} holds NaN or infinity in {name} of episode {rows['episode'][strange][0]}, "
+                f"where every number must be finite; delete {path} and collect it again"
+            )
