@@ -1,7 +1,6 @@
 """`svaedc collect`: plan the missing shards, submit them to a pool of Ray actors, gather, record."""
 
 import errno
-import socket
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,13 +13,13 @@ from cluster.errors import UserError
 from cluster.pool import Done, Failed, Limits, Pool
 from cluster.progress import ProgressLine, duration, say
 from cluster.quarantine import FOLDER, put_aside, quarantined, release
+from cluster.rollout_actor import RolloutActor
 from cluster.session import Session
 from cluster.tally import Recorder, Tally
 from cluster.tracking import Run, Tracker
-from workers import setups
-from workers.collection import ShardReport, collect_shard
+from workers.collection import ShardReport
 from workers.dataset import shards
-from workers.dataset.folder import Dataset, create, open_dataset
+from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.setups import Setup
@@ -31,34 +30,6 @@ _DISK = {
 }
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
-
-
-class RolloutActor:
-    """A process that rolls out shards of one dataset."""
-
-    def __init__(self, setup: str, folder: str) -> None:
-        self._setup = setups.load(setup)
-        self._dataset = open_dataset(Path(folder))
-        self._require_same_code()
-
-    def ready(self) -> None:
-        """Answers once the process has started and found its dataset."""
-
-    def collect(self, shard: Shard) -> ShardReport:
-        """One shard, from its first episode to its name in the dataset."""
-        return collect_shard(self._setup, self._dataset, shard)
-
-    def _require_same_code(self) -> None:
-        """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""
-        asked = self._dataset.identity
-        own = identity_of(self._setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard)
-        differences = asked.differences(own)
-        if differences:
-            raise ValueError(
-                f"the machine {socket.gethostname()} would roll out other episodes than "
-                f"{self._dataset.folder} holds; the two differ in {'; '.join(differences)}. "
-                "Install the same svaedc and libraries on every machine"
-            )
 
 
 def collect(

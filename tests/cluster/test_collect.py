@@ -14,11 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from cluster.collect import RolloutActor, _note_failure, _pool, collect
+from cluster.collect import _note_failure, _pool, collect
 from cluster.config import CollectSettings
 from cluster.errors import UserError
 from cluster.pool import Failed
 from cluster.quarantine import put_aside, quarantined, release
+from cluster.rollout_actor import RolloutActor
 from cluster.tally import Recorder, Tally
 from cluster.tracking import open_tracker
 from workers import setups

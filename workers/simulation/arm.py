@@ -98,7 +98,8 @@ class Arm:
         path = Path(pybullet_data.getDataPath()) / urdf
         if not path.exists():
             raise FileNotFoundError(f"no robot description at {path}")
-        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        # Nobody looks: the meshes that are only seen would take 100 MB.
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
         return pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=self._client)
 
     def _joint_indices(self) -> dict[str, int]:
