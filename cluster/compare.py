@@ -1,35 +1,27 @@
 """`svaedc compare`: plan methods x seeds, submit the runs to Ray Tune, gather their trials, record."""
 
-import json
-import os
-import shutil
-from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
-from ray import tune
-from ray.tune import Callback, FailureConfig, RunConfig, TuneConfig, Tuner
-
-from cluster import figures
-from cluster.comparison_job import ComparisonJob, RunTrainable
+from cluster.comparison_folder import alone_in, claim
+from cluster.comparison_job import ComparisonJob
+from cluster.comparison_report import FIGURE, SUMMARY, lines, publish, summary_of
+from cluster.comparison_runs import Standing, Watch, submit
+from cluster.comparison_tracking import Note, TrackedComparison, begin, note_in
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
 from cluster.progress import ProgressLine, say
-from cluster.results import RUNS, RunKey, all_runs, recorded, rows, write_table
+from cluster.results import TABLE, RunKey, all_runs, recorded
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
 from svaedc import checkpoint, methods
-from svaedc.statistics import Reporting, Summary, summarise
+from svaedc.comparison import Trial
+from svaedc.statistics import Summary
 from workers.dataset.shards import sha256
-from workers.randomness import generator
 from workers.rollout import VERSION
 from workers.setups import Setup
-
-_RUN_FAILURES = 2
-_IDENTITY = "comparison.json"
 
 
 @dataclass(frozen=True)
@@ -40,10 +32,56 @@ class Grid:
     seed: int
     runs: int
 
+    def __post_init__(self) -> None:
+        """Refuse a grid without runs, and one that names a method twice."""
+        if not self.methods:
+            raise UsageError(f"--methods must name at least one of {', '.join(methods.names())}, got none")
+        if len(set(self.methods)) < len(self.methods):
+            raise UsageError(f"--methods must name each method once, got {', '.join(self.methods)}")
+        if self.runs < 1:
+            raise UsageError(f"--runs must be at least 1, got {self.runs}")
+
     def keys(self) -> list[RunKey]:
         """All runs; the methods of a seed follow each other, so that partial results compare."""
         seeds = range(self.seed, self.seed + self.runs)
         return [RunKey(method, run) for run in seeds for method in self.methods]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison ends with.
+
+    Attributes:
+        summary: of every run in its folder.
+        url: of its MLflow run.
+    """
+
+    summary: Summary
+    url: str
+
+
+@dataclass(frozen=True)
+class _Plan:
+    job: ComparisonJob
+    grid: Grid
+    model: str  # its hash; "" when no method asked for needs one
+    identity: Mapping[str, Any]
+    slots: int
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What the MLflow run says of the command, besides the identity."""
+        return {
+            "methods": ", ".join(self.grid.methods),
+            "runs": self.grid.runs,
+            "trials": self.job.trials,
+            "seed": self.grid.seed,
+            "slots": self.slots,
+        }
+
+    def missing(self, runs: Mapping[RunKey, Sequence[Trial]]) -> list[RunKey]:
+        """The runs asked for that are not whole."""
+        return [key for key in self.grid.keys() if len(runs.get(key, ())) < self.job.length]  # noqa: SIM118
 
 
 def compare(
@@ -57,27 +95,26 @@ def compare(
     settings: CompareSettings,
     session: Session,
     tracker: Tracker,
-) -> Summary:
+) -> Comparison:
     """Run what is missing of a comparison, then summarise all of it.
 
     Raises:
         UsageError: a method or gap level does not exist, or a method lacks its model.
-        UserError: the folder holds another comparison, the model is of another setup, or runs kept failing.
+        UserError: the folder holds another comparison or cannot be written, the model is of another setup,
+            runs kept failing, or MLflow lacks some of the results.
     """
-    job, missing = _plan(setup, grid, trials, gap, model, folder, settings)
+    plan = _plan(setup, grid, trials, gap, model, folder, settings)
     session.preflight(settings.slots)
-    parameters = {
-        **json.loads((folder / _IDENTITY).read_text()),
-        "methods": ", ".join(grid.methods),
-        "runs": grid.runs,
-        "trials": trials,
-        "seed": grid.seed,
-        "slots": settings.slots,
-    }
-    with tracker.run(f"compare {setup.name}", "compare", parameters) as run:
-        if missing:
-            _submit(job, missing, len(grid.keys()), settings, run)
-        return _record(job, setup, run)
+    with alone_in(folder):
+        parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
+        note = note_in(folder, tracker)
+        if _is_finished(plan, note):
+            say(f"{folder} holds the whole comparison: nothing to do")
+            return Comparison(summary_of(plan.job, list(all_runs(folder))), Run(tracker, note.run).url)
+        tracked = begin(folder, tracker, f"compare {setup.name}", parameters)
+        with tracked.run:
+            _submit(plan, tracked)
+            return Comparison(_record(plan, setup, tracked), tracked.run.url)
 
 
 def _plan(
@@ -88,7 +125,7 @@ def _plan(
     model: Path | None,
     folder: Path,
     settings: CompareSettings,
-) -> tuple[ComparisonJob, list[RunKey]]:
+) -> _Plan:
     try:
         setup.gap(gap)
         with_model = [name for name in grid.methods if methods.needs_model(name)]
@@ -97,7 +134,6 @@ def _plan(
     if with_model and model is None:
         raise UsageError(f"{', '.join(with_model)} need a trained model: name its folder with --model")
     path = _checkpoint(model, setup) if with_model and model else None
-    _claim(folder, _identity(setup, gap, path, settings))
     job = ComparisonJob(
         folder=folder.resolve(),
         setup=setup.name,
@@ -107,7 +143,14 @@ def _plan(
         initial=settings.initial_trials,
         trials=trials,
     )
-    return job, [key for key in grid.keys() if len(recorded(key.path(folder))) < job.length]  # noqa: SIM118
+    identity = {
+        "setup": setup.name,
+        "gap": gap,
+        "pool_size": settings.pool_size,
+        "initial_trials": settings.initial_trials,
+        "rollout_version": VERSION,
+    }
+    return _Plan(job, grid, sha256(path) if path else "", identity, settings.slots)
 
 
 def _checkpoint(model: Path, setup: Setup) -> Path:
@@ -120,119 +163,42 @@ def _checkpoint(model: Path, setup: Setup) -> Path:
     return path
 
 
-def _identity(setup: Setup, gap: str, model: Path | None, settings: CompareSettings) -> dict[str, Any]:
-    return {
-        "setup": setup.name,
-        "gap": gap,
-        "model": sha256(model) if model else "",
-        "pool_size": settings.pool_size,
-        "initial_trials": settings.initial_trials,
-        "rollout_version": VERSION,
-    }
+def _is_finished(plan: _Plan, note: Note) -> bool:
+    """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
+    folder, runs = plan.job.folder, dict(all_runs(plan.job.folder))
+    whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
+    return whole and all((folder / name).exists() for name in (TABLE, SUMMARY, FIGURE))
 
 
-def _claim(folder: Path, identity: dict[str, Any]) -> None:
-    """Begin a comparison in a folder, or check that the one in it is this one."""
-    (folder / RUNS).mkdir(parents=True, exist_ok=True)
-    path = folder / _IDENTITY
-    if not path.exists():
-        path.write_text(json.dumps(identity, indent=2) + "\n")
-    found = json.loads(path.read_text())
-    for name, value in identity.items():
-        if found.get(name) != value:
-            raise UserError(
-                f"{folder} holds a comparison with {name} {found.get(name)!r}, not {value!r}; "
-                "choose another folder with --out"
-            )
+def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
+    folder, keys, length = plan.job.folder, plan.grid.keys(), plan.job.length
+    runs = dict(all_runs(folder))
+    missing = plan.missing(runs)
+    if not missing:
+        return
+
+    def ended(key: RunKey) -> None:
+        trials = recorded(key.path(folder))
+        if len(trials) >= length:
+            tracked.try_child(key, trials)
+
+    standing = Standing(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
+    done = sum(min(len(runs.get(key, ())), length) for key in keys)
+    with ProgressLine("trials", len(keys) * length, done) as progress:
+        submit(plan.job, missing, plan.slots, Watch(progress, standing, ended))
 
 
-@dataclass
-class _Watch(Callback):
-    """Shows trials as they end, and keeps each run in MLflow once it is over."""
-
-    job: ComparisonJob
-    progress: ProgressLine
-    parent: Run
-    best: dict[str, dict[int, float]] = field(default_factory=lambda: defaultdict(dict))
-
-    def on_trial_result(
-        self,
-        iteration: int,  # noqa: ARG002
-        trials: Any,  # noqa: ARG002
-        trial: Any,
-        result: dict[str, Any],
-        **_: Any,
-    ) -> None:
-        """A trial ended."""
-        key = RunKey(**trial.config["run"])
-        self.best[key.method][key.run] = result["best"]
-        means = ", ".join(f"{method} {fmean(runs.values()):.2f}" for method, runs in self.best.items())
-        self.progress.advance(1, f"best so far: {means}")
-
-    def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
-        """A run ended."""
-        key = RunKey(**trial.config["run"])
-        with self.parent.child(f"{key.method} {key.run}", {"method": key.method, "run": key.run}) as run:
-            whole = recorded(key.path(self.job.folder))
-            run.curves({name: [getattr(trial, name) for trial in whole] for name in ("f", "y", "best")})
-
-
-def _submit(
-    job: ComparisonJob, missing: Sequence[RunKey], total: int, settings: CompareSettings, run: Run
-) -> None:
-    os.environ["TUNE_DISABLE_SIGINT_HANDLER"] = "1"  # Ctrl-C is ours to handle
-    os.environ["RAY_AIR_NEW_OUTPUT"] = "0"  # the new one prints whatever the verbosity
-    storage = job.folder / ".ray-tune"
-    left = sum(job.length - len(recorded(key.path(job.folder))) for key in missing)
-    with ProgressLine("trials", total * job.length, total * job.length - left) as progress:
-        tuner = Tuner(
-            tune.with_resources(RunTrainable, {"cpu": 1}),
-            param_space={
-                "job": job,
-                "run": tune.grid_search([{"method": key.method, "run": key.run} for key in missing]),
-            },
-            tune_config=TuneConfig(max_concurrent_trials=settings.slots, reuse_actors=True),
-            run_config=RunConfig(
-                name="runs",
-                storage_path=str(storage),
-                failure_config=FailureConfig(max_failures=_RUN_FAILURES),
-                callbacks=[_Watch(job, progress, run)],
-                verbose=0,
-            ),
-        )
-        try:
-            results = tuner.fit()
-        finally:
-            shutil.rmtree(storage, ignore_errors=True)
-    if results.errors:
-        raise UserError(
-            f"{len(results.errors)} of {len(missing)} runs kept failing, the first with: "
-            f"{str(results.errors[0]).strip().splitlines()[-1]}. "
-            "The others are kept; the same command tries again"
-        )
-
-
-def _record(job: ComparisonJob, setup: Setup, run: Run) -> Summary:
-    summary = summarise(rows(job.folder), Reporting(initial=job.initial), generator(0, "bootstrap", 0))
-    table = write_table(job.folder, setup=job.setup, gap=job.gap)
-    path = job.folder / "summary.json"
-    path.write_text(json.dumps(summary.as_json(), indent=2) + "\n")
-    seeds = len({key.run for key, _ in all_runs(job.folder)})
-    title = f"{job.setup}: mean of {seeds} runs, 90 % intervals ({job.gap} gap)"
-    drawn = figures.best_so_far(
-        job.folder / "figure", summary, title=title, initial=job.initial, limits=setup.objective_limits
-    )
-    for figure in drawn:
-        run.figure(figure)
-    run.file(table)
-    run.file(path)
-    for name, method in summary.methods.items():
-        run.curves({f"best/{name}": [estimate.mean for estimate in method.best]})
-        best, broken = method.best[-1], method.broken_trials.mean
-        say(
-            f"{name:>18}: best after {summary.trials} trials {best.mean:+.2f} "
-            f"[{best.low:+.2f}, {best.high:+.2f}], mean objective of its trials "
-            f"{method.objective.mean:+.2f}, broken {broken:.0%}, {method.runs} runs"
-        )
-    say(f"{job.folder / 'figure.png'}; {run.url}")
+def _record(plan: _Plan, setup: Setup, tracked: TrackedComparison) -> Summary:
+    runs = list(all_runs(plan.job.folder))
+    summary = summary_of(plan.job, runs)
+    report = publish(plan.job, setup, runs, summary)
+    for line in lines(summary):
+        say(line)
+    say(f"{plan.job.folder / FIGURE}; {tracked.run.url}")
+    asked = set(plan.grid.keys())
+    for key, trials in runs:
+        if key in asked:
+            tracked.child(key, trials)
+    curves = {f"best/{name}": [best.mean for best in method.best] for name, method in summary.methods.items()}
+    tracked.complete(report, curves, sum(len(trials) for _, trials in runs))
     return summary

@@ -1,5 +1,6 @@
 """What one worker of a comparison does: hidden physics, shared first trials, a method, trial after trial."""
 
+import errno
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from workers.environments.environment import Environment
 from workers.randomness import generator
 from workers.rollout import rollout
 from workers.setups import Setup
+
+_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}
 
 
 @dataclass(frozen=True)
@@ -112,8 +115,15 @@ class RunTrainable(tune.Trainable):
         return True
 
     def step(self) -> dict[str, Any]:
-        """The next trial."""
-        trial = next(self._trials)
+        """The next trial, or why the disk takes none; trying again would not help there."""
+        try:
+            trial = next(self._trials, None)
+        except OSError as error:
+            if error.errno not in _DISK:
+                raise
+            return {"disk": str(error), "done": True}
+        if trial is None:  # the record was whole before this attempt
+            return {"done": True}
         return {
             "trial": trial.index,
             "f": trial.f,

@@ -1,20 +1,25 @@
 """Files of a comparison: one growing record per run, and one table of all trials."""
 
+import fcntl
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count, takewhile
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from cluster.errors import UserError
+from cluster.files import replacing
 from svaedc.comparison import Trial
 from svaedc.statistics import Row
 
 RUNS = "runs"
+TABLE = "trials.parquet"
 
 
 @dataclass(frozen=True, order=True)
@@ -24,9 +29,15 @@ class RunKey:
     method: str
     run: int
 
+    def __str__(self) -> str:
+        return f"{self.method} {self.run}"
+
     def path(self, folder: Path) -> Path:
         """Where the run's trials are recorded."""
         return folder / RUNS / f"{self.method}-{self.run:05d}.jsonl"
+
+
+Runs = Sequence[tuple[RunKey, list[Trial]]]
 
 
 def append(path: Path, trial: Trial) -> None:
@@ -42,22 +53,46 @@ def append(path: Path, trial: Trial) -> None:
         "stop": trial.stop,
         "x": [float(value) for value in trial.x],
     }
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(line) + "\n")
+    with path.open("ab+") as file:
+        # A worker whose driver died may still be at it.
+        fcntl.flock(file, fcntl.LOCK_EX)
+        _drop_torn_line(file)
+        file.write(json.dumps(line).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
 
 
+def _drop_torn_line(file: BinaryIO) -> None:
+    """Remove a last line that a kill or a full disk cut off."""
+    file.seek(0)
+    text = file.read()
+    whole = text.rfind(b"\n") + 1
+    if whole < len(text):
+        file.truncate(whole)
+
+
 def recorded(path: Path) -> list[Trial]:
-    """The trials of a run so far; a last line cut off by a crash is removed from the file."""
+    """The trials of a run so far, up to the first that is absent.
+
+    A last line that was cut off counts as absent. Of a trial recorded twice, by a worker that outlived its
+    driver, the first counts; they differ in nothing but their seconds.
+
+    Raises:
+        UserError: a whole line is no trial.
+    """
     if not path.exists():
         return []
-    text = path.read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        with path.open("r+b") as file:
-            file.truncate(len(whole))
-    return [_trial(json.loads(line)) for line in whole.splitlines()]
+    trials: dict[int, Trial] = {}
+    for number, line in enumerate(path.read_bytes().split(b"\n")[:-1], start=1):
+        try:
+            trial = _trial(json.loads(line))
+        except (ValueError, TypeError, KeyError) as error:
+            raise UserError(
+                f"line {number} of {path} is not the record of a trial; delete the file, "
+                "and the same command repeats that one run"
+            ) from error
+        trials.setdefault(trial.index, trial)
+    return [trials[index] for index in takewhile(trials.__contains__, count())]
 
 
 def _trial(line: dict[str, Any]) -> Trial:
@@ -72,16 +107,16 @@ def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
         yield RunKey(method, int(run)), recorded(path)
 
 
-def rows(folder: Path) -> list[Row]:
+def rows(runs: Runs) -> list[Row]:
     """What the statistics need of every trial."""
     return [
         Row(key.method, key.run, trial.index, trial.f, trial.success)
-        for key, trials in all_runs(folder)
+        for key, trials in runs
         for trial in trials
     ]
 
 
-def write_table(folder: Path, *, setup: str, gap: str) -> Path:
+def write_table(folder: Path, runs: Runs, *, setup: str, gap: str) -> Path:
     """`trials.parquet`: one row per trial of all runs."""
     records = [
         {
@@ -99,11 +134,9 @@ def write_table(folder: Path, *, setup: str, gap: str) -> Path:
             "stop": trial.stop,
             "x": trial.x.tolist(),
         }
-        for key, trials in all_runs(folder)
+        for key, trials in runs
         for trial in trials
     ]
-    path = folder / "trials.parquet"
-    temporary = path.with_suffix(".tmp")
-    pq.write_table(pa.Table.from_pylist(records), temporary, compression="zstd")
-    temporary.replace(path)
-    return path
+    with replacing(folder / TABLE) as path:
+        pq.write_table(pa.Table.from_pylist(records), path, compression="zstd")
+    return folder / TABLE

@@ -1,6 +1,14 @@
-"""`svaedc compare` on a real cluster: shared beginnings, resumed trial by trial, refused if it does not fit."""
+"""`svaedc compare` on a real cluster: shared beginnings, resumed trial by trial, refused if it misfits."""
 
 import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -8,22 +16,29 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 
+from cluster import figures
 from cluster.compare import Grid, compare
-from cluster.config import CompareSettings
+from cluster.comparison_folder import alone_in
+from cluster.comparison_job import evaluation
+from cluster.comparison_runs import Standing
+from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
-from cluster.results import RunKey, recorded
+from cluster.results import RunKey, append, recorded
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
+from svaedc.comparison import Trial
+from svaedc.methods import names
 from svaedc.model import SvaeDc
 from svaedc.presets import Sizes, compact
+from svaedc.statistics import Reporting, Row, summarise
 from workers import setups
 
 SETTINGS = CompareSettings(slots=2, pool_size=200)
 
 
-def untrained(folder: Path, setup: str = "franka") -> Path:
+def untrained(folder: Path, setup: str = "franka", seed: int = 0) -> Path:
     """A checkpoint whose predictions mean nothing; enough to test the machine around it."""
-    torch.manual_seed(0)
+    torch.manual_seed(seed)
     model = SvaeDc(compact(Sizes(48, 25, 100)).model)
     folder.mkdir()
     checkpoint.save(folder / "model.pt", model, {"setup": setup})
@@ -40,25 +55,39 @@ def compared(ray_session, tracking_settings, tmp_path):
         gap: str = "paper",
         settings: CompareSettings = SETTINGS,
         runs: int = 2,
+        trials: int = 2,
+        folder: Path = tmp_path / "out",
+        tracking: TrackingSettings = tracking_settings,
     ) -> Path:
         compare(
             setup=setups.load("franka"),
             grid=Grid(tuple(methods.split(",")), seed=1000, runs=runs),
-            trials=2,
+            trials=trials,
             gap=gap,
             model=model,
-            folder=tmp_path / "out",
+            folder=folder,
             settings=settings,
             session=ray_session,
-            tracker=open_tracker(tracking_settings),
+            tracker=open_tracker(tracking),
         )
-        return tmp_path / "out"
+        return folder
 
     return run
 
 
 def table(folder: Path) -> list[dict]:
     return pq.read_table(folder / "trials.parquet").drop(["seconds"]).to_pylist()
+
+
+def mlflow_runs(tracking_settings) -> tuple[list, list]:
+    """Parent runs and child runs, the newest first."""
+    runs = open_tracker(tracking_settings).client.search_runs(["1"])
+    parents = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
+    return parents, [run for run in runs if "mlflow.parentRunId" in run.data.tags]
+
+
+def trial(index: int, seconds: float = 0.1) -> Trial:
+    return Trial(index, np.zeros(48, dtype=np.float32), 0.5, 0.1, 0.5, True, "ok", seconds, "")
 
 
 def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, tracking_settings):
@@ -70,8 +99,8 @@ def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, t
     ]
     for run in (1000, 1001):
         first = [row for row in rows if row["run"] == run and row["trial"] < 2]
-        for trial in (0, 1):
-            same = [(row["x"], row["f"]) for row in first if row["trial"] == trial]
+        for index in (0, 1):
+            same = [(row["x"], row["f"]) for row in first if row["trial"] == index]
             assert len(same) == 3
             assert same[0] == same[1] == same[2]
     for row in rows:
@@ -82,12 +111,12 @@ def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, t
     assert summary["trials"] == 4
     assert (out / "figure.png").stat().st_size > 10_000
     assert (out / "figure.svg").read_text().count("<path") > 10
-    client = open_tracker(tracking_settings).client
-    runs = client.search_runs(["1"])
-    [parent] = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
-    children = [run for run in runs if run.data.tags.get("mlflow.parentRunId") == parent.info.run_id]
+    [parent], children = mlflow_runs(tracking_settings)
+    assert {run.data.tags["mlflow.parentRunId"] for run in children} == {parent.info.run_id}
     assert len(children) == 6
+    client = open_tracker(tracking_settings).client
     assert len(client.get_metric_history(children[0].info.run_id, "best")) == 4
+    assert client.list_artifacts(parent.info.run_id, "figures")
 
 
 def test_an_interrupted_comparison_goes_on_trial_by_trial_to_the_same_table(compared):
@@ -101,17 +130,151 @@ def test_an_interrupted_comparison_goes_on_trial_by_trial_to_the_same_table(comp
     assert table(compared()) == whole
 
 
-def test_more_runs_and_methods_extend_a_comparison(compared):
+def test_the_same_command_again_does_nothing_and_names_the_same_run(compared, tracking_settings, capsys):
+    out = compared("random")
+    before = {
+        path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and path.name[0] != "."
+    }
+    capsys.readouterr()
+    compared("random")
+    assert "nothing to do" in capsys.readouterr().err
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    parents, children = mlflow_runs(tracking_settings)
+    assert (len(parents), len(children)) == (1, 2)
+
+
+def test_more_runs_and_methods_extend_a_comparison(compared, tracking_settings):
     before = table(compared("random", runs=1))
     after = table(compared("random,se", runs=2))
     assert [row for row in after if row["method"] == "random" and row["run"] == 1000] == before
     assert len(after) == 16
+    _, children = mlflow_runs(tracking_settings)
+    assert sorted(run.info.run_name for run in children) == [
+        "random 1000",
+        "random 1001",
+        "se 1000",
+        "se 1001",
+    ]
 
 
-def test_the_hidden_physics_differ_between_runs_and_between_gaps(compared):
-    rows = table(compared("random"))
-    one, other = (np.array([row["f"] for row in rows if row["run"] == run]) for run in (1000, 1001))
-    assert not np.array_equal(one, other)
+def command(folder: Path) -> list[str]:
+    return [
+        *(sys.executable, "-m", "cluster", "compare", "--setup", "franka", "--out", str(folder / "out")),
+        *("--methods", "random,se", "--runs", "2", "--trials", "8", "--seed", "1000"),
+        *("--set", "compare.pool_size=200", "--set", "ray.num_cpus=2"),
+        *("--set", f"tracking.uri=sqlite:///{folder / 'store' / 'mlflow.db'}"),
+        *("--set", "tracking.experiment=tests"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)]
+)
+def test_a_comparison_stopped_by_a_signal_goes_on_to_the_same_table(
+    number, code, compared, tmp_path, tracking_settings
+):
+    with subprocess.Popen(
+        command(tmp_path), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    ) as process:
+        deadline = time.monotonic() + 120
+        while not any(path.stat().st_size for path in tmp_path.glob("out/runs/*.jsonl")):
+            assert process.poll() is None, process.communicate()
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        if number == signal.SIGINT:  # a terminal sends it to the whole group
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        output, _ = process.communicate(timeout=60)
+    assert process.returncode == code, output
+    if number != signal.SIGKILL:
+        assert output.splitlines() == [
+            "stopped: everything finished is kept, and the same command goes on from here"
+        ]
+    assert not (tmp_path / "out" / "trials.parquet").exists()
+    after = table(compared(trials=8))
+    [parent], children = mlflow_runs(tracking_settings)
+    assert [run.info.status for run in (parent, *children)] == ["FINISHED"] * 5
+    assert after == table(compared(trials=8, folder=tmp_path / "whole"))
+
+
+def test_a_trial_recorded_twice_counts_once_and_one_after_a_gap_does_not(tmp_path):
+    path = tmp_path / "se-00000.jsonl"
+    for index, seconds in ((0, 0.1), (1, 0.2), (1, 0.3), (3, 0.4)):
+        append(path, trial(index, seconds))
+    assert [(found.index, found.seconds) for found in recorded(path)] == [(0, 0.1), (1, 0.2)]
+
+
+def test_the_next_trial_replaces_a_line_that_was_cut_off(tmp_path):
+    path = tmp_path / "se-00000.jsonl"
+    append(path, trial(0))
+    path.write_bytes(path.read_bytes() + b'{"trial": 1, "f"')
+    append(path, trial(1))
+    assert [found.index for found in recorded(path)] == [0, 1]
+    assert path.read_bytes().count(b"\n") == 2
+
+
+def test_a_damaged_record_is_refused_naming_its_line(compared):
+    path = RunKey("random", 1000).path(compared("random", runs=1))
+    path.write_text(path.read_text().replace('"f"', '"g"', 1))
+    with pytest.raises(UserError, match=r"line 1 of .*random-01000.jsonl is not the record of a trial"):
+        compared("random", runs=2)
+
+
+@pytest.mark.parametrize("damage", ["no", "[]", "{}", '{"setup": "franka"}', "\x00"])
+def test_a_damaged_identity_is_refused_naming_its_file(compared, tmp_path, damage):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "comparison.json").write_text(damage)
+    with pytest.raises(UserError, match=r"comparison.json is damaged: .* put the file back"):
+        compared("random")
+    assert (tmp_path / "out" / "comparison.json").read_text() == damage
+
+
+def test_runs_without_their_identity_are_refused(compared, tmp_path):
+    (tmp_path / "out" / "runs").mkdir(parents=True)
+    append(RunKey("random", 1000).path(tmp_path / "out"), trial(0))
+    with pytest.raises(UserError, match=r"comparison\.json is gone, though there are runs"):
+        compared("random")
+
+
+def test_two_comparisons_at_once_in_one_folder_are_refused(compared, tmp_path):
+    with (
+        alone_in(tmp_path / "out"),
+        pytest.raises(UserError, match=r"another comparison is at work in .*/out; wait for its end"),
+    ):
+        compared("random")
+    assert len(table(compared("random", runs=1))) == 4
+
+
+def test_the_hidden_physics_belong_to_the_run_and_to_the_gap():
+    setup = setups.load("franka")
+    x = np.random.default_rng(0).random(setup.dimensions, dtype=np.float32)
+    with setup.open() as environment:
+
+        def f(gap: str, run: int) -> float:
+            return evaluation(setup, environment, gap, run)(x).f
+
+        found = [f(gap, run) for gap in ("paper", "training", "wide") for run in (1000, 1001)]
+        assert len(set(found)) == 6
+        assert f("wide", 1001) == found[-1]
+
+
+def test_a_comparison_runs_under_the_gap_it_was_asked_for(compared, tmp_path):
+    paper, wide = (table(compared("random", gap=gap, folder=tmp_path / gap)) for gap in ("paper", "wide"))
+    assert [row["x"] for row in paper] == [row["x"] for row in wide]
+    assert all(one["f"] != other["f"] for one, other in zip(paper, wide, strict=True))
+
+
+def test_the_model_belongs_to_a_comparison_from_the_first_method_that_needs_one(compared, tmp_path):
+    one, other = untrained(tmp_path / "one"), untrained(tmp_path / "other", seed=1)
+    compared("random", runs=1)
+    compared("random", model=other, runs=1)
+    compared("random,svae", model=one, runs=1)
+    compared("se", model=other, runs=1)
+    out = compared("matern", runs=1)
+    assert {row["method"] for row in table(out)} == {"random", "svae", "se", "matern"}
+    with pytest.raises(UserError, match=r"holds a comparison with model '\w+', not '\w+'"):
+        compared("svae-dc", model=other, runs=1)
 
 
 def test_unknown_names_are_refused_with_the_nearest(compared):
@@ -119,6 +282,15 @@ def test_unknown_names_are_refused_with_the_nearest(compared):
         compared("svae-cd")
     with pytest.raises(UsageError, match="did you mean 'paper'"):
         compared(gap="papre")
+
+
+@pytest.mark.parametrize(
+    ("methods", "message"),
+    [((), "at least one of botorch, .*, got none"), (("se", "se"), "once, got se, se")],
+)
+def test_a_grid_names_every_method_once_and_at_least_one(methods, message):
+    with pytest.raises(UsageError, match=message):
+        Grid(methods, seed=0, runs=1)
 
 
 def test_a_method_without_its_model_is_refused(compared):
@@ -145,3 +317,94 @@ def test_another_comparison_in_the_folder_is_refused_naming_the_difference(compa
 def test_more_slots_than_cpus_are_refused(compared):
     with pytest.raises(UserError, match="needs 7 CPUs"):
         compared("random", settings=CompareSettings(slots=7, pool_size=200))
+
+
+def test_a_folder_that_cannot_be_written_is_refused_naming_it(compared, tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    with pytest.raises(UserError, match=r"cannot write to .*/file/out: .*Not a directory.*--out"):
+        compared("random", folder=tmp_path / "file" / "out")
+
+
+@pytest.fixture
+def disk_with_room_for(tmp_path):
+    """Mounts a small file system; the number of bytes is its size."""
+    small = tmp_path / "small"
+    small.mkdir()
+
+    def mount(size: str) -> Path:
+        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(small)], check=True)
+        return small
+
+    yield mount
+    subprocess.run(["umount", "--lazy", str(small)], check=True)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small file system")
+def test_a_full_disk_ends_a_comparison_with_nothing_lost(compared, disk_with_room_for, tmp_path):
+    small = disk_with_room_for("40k")
+    with pytest.raises(UserError, match=r"cannot write to .*No space left on device; make room"):
+        compared("random", trials=20, folder=small / "out")
+    kept = [found for path in small.glob("out/runs/*") for found in recorded(path)]
+    assert kept
+    shutil.copytree(small / "out", tmp_path / "roomy")
+    assert table(compared("random", trials=20, folder=tmp_path / "roomy")) == table(
+        compared("random", trials=20, folder=tmp_path / "whole")
+    )
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small file system")
+def test_a_disk_too_full_for_the_figure_keeps_the_trials(compared, disk_with_room_for):
+    small = disk_with_room_for("64k")
+    with pytest.raises(UserError, match=r"cannot write to .*No space left on device; make room"):
+        compared("random", runs=1, folder=small / "out")
+    assert len(recorded(RunKey("random", 1000).path(small / "out"))) == 4
+    assert not list(small.glob("out/.unfinished*"))
+    subprocess.run(["mount", "-o", "remount,size=2m", str(small)], check=True)
+    assert len(table(compared("random", runs=1, folder=small / "out"))) == 4
+    assert (small / "out" / "figure.svg").exists()
+
+
+def test_a_store_that_fails_meanwhile_costs_no_run_and_is_caught_up_with(compared, tracking_settings, capsys):
+    out = compared("random", runs=1)
+    with closing(sqlite3.connect(tracking_settings.uri.removeprefix("sqlite:///"))) as store:
+        store.execute(
+            "CREATE TRIGGER refusal BEFORE INSERT ON runs WHEN NEW.name LIKE 'random %' "
+            "BEGIN SELECT RAISE(ABORT, 'refused'); END"
+        )
+        with pytest.raises(UserError, match=r"MLflow store .* cannot be used"):
+            compared("random", runs=3)
+        store.execute("DROP TRIGGER refusal")
+    assert capsys.readouterr().err.count("The comparison goes on") == 1
+    whole = table(out)
+    assert len(whole) == 12
+    assert table(compared("random", runs=3)) == whole
+    parents, children = mlflow_runs(tracking_settings)
+    assert sorted(run.info.run_name for run in children) == ["random 1000", "random 1001", "random 1002"]
+    assert {run.info.status for run in parents + children} == {"FINISHED"}
+
+
+def test_the_standing_shows_every_method_in_the_order_asked_for():
+    standing = Standing(("se", "random"), {RunKey("random", 0): 0.25, RunKey("random", 1): 0.75})
+    assert str(standing) == "random 0.50"
+    standing.best[RunKey("se", 0)] = 0.125
+    assert str(standing) == "se 0.12, random 0.50"
+    standing.best[RunKey("se", 1)] = float("nan")
+    assert str(standing) == "se 0.12, random 0.50"
+
+
+def test_the_figure_has_the_same_bytes_every_time_and_names_every_method(tmp_path):
+    rng = np.random.default_rng(0)
+    rows = [
+        Row(name, run, index, float(rng.uniform(-1, 1)), success=False)
+        for name, run, index in ((n, r, t) for n in names() for r in range(3) for t in range(5))
+    ]
+    summary = summarise([*rows, Row("unfinished", 0, 0, 0.0, success=False)], Reporting(), rng)
+    drawn = [
+        figures.best_so_far(tmp_path / name, summary, title="some title", initial=2, limits=(-1.0, 1.0))
+        for name in ("one.png", "other.png")
+    ]
+    for one, other in zip(*drawn, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+    svg = drawn[0][1].read_text()
+    assert all(f"<!-- {name} (n = 3) -->" in svg for name in names())
+    assert "unfinished (n" not in svg

@@ -1,0 +1,66 @@
+"""What people read of a comparison: a table, a summary and a figure."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from cluster import figures
+from cluster.comparison_folder import writing
+from cluster.comparison_job import ComparisonJob
+from cluster.files import replacing
+from cluster.results import Runs, rows, write_table
+from svaedc.statistics import Reporting, Summary, summarise
+from workers.randomness import generator
+from workers.setups import Setup
+
+SUMMARY = "summary.json"
+FIGURE = "figure.png"
+
+
+@dataclass(frozen=True)
+class Report:
+    """The files that were written."""
+
+    files: tuple[Path, ...]
+    figures: tuple[Path, ...]
+
+
+def summary_of(job: ComparisonJob, runs: Runs) -> Summary:
+    """Means, intervals and paired differences over all runs of the folder."""
+    return summarise(rows(runs), Reporting(initial=job.initial), generator(0, "bootstrap", 0))
+
+
+def publish(job: ComparisonJob, setup: Setup, runs: Runs, summary: Summary) -> Report:
+    """Write what people read; each file is whole, or as it was before.
+
+    Raises:
+        UserError: the disk is full.
+    """
+    path = job.folder / SUMMARY
+    with writing(job.folder):
+        table = write_table(job.folder, runs, setup=job.setup, gap=job.gap)
+        with replacing(path) as unfinished:
+            unfinished.write_text(json.dumps(summary.as_json(), indent=2) + "\n")
+        drawn = figures.best_so_far(
+            job.folder / FIGURE,
+            summary,
+            title=f"{job.setup}: Bayesian optimisation under hidden physics ({job.gap} gap)",
+            initial=job.initial,
+            limits=setup.objective_limits,
+        )
+    return Report((table, path), drawn)
+
+
+def lines(summary: Summary) -> Iterator[str]:
+    """A line about every method."""
+    for name, method in summary.methods.items():
+        if not method.runs:
+            yield f"{name:>18}: no run has all {summary.trials} trials yet"
+            continue
+        best, broken = method.best[-1], method.broken_trials.mean
+        yield (
+            f"{name:>18}: best after {summary.trials} trials {best.mean:+.2f} "
+            f"[{best.low:+.2f}, {best.high:+.2f}], mean objective of its trials "
+            f"{method.objective.mean:+.2f}, broken {broken:.0%}, {method.runs} runs"
+        )
