@@ -65,7 +65,7 @@ class TrainSettings(Section):
     workers: PositiveInt = 1
     """Data-parallel training processes."""
     threads: PositiveInt | Literal["all"] = "all"
-    """Of each process, one CPU each; `all` shares the CPUs of the cluster among the processes."""
+    """Of each process, one CPU each; `all` shares the free CPUs among the processes, each on one machine."""
     updates: PositiveInt | Literal["preset"] = "preset"
     """Gradient updates of each stage; fewer train faster and worse."""
     stride: PositiveInt = 5
@@ -76,10 +76,6 @@ class TrainSettings(Section):
     """Where shards are decoded into one memory-mapped array, once per dataset."""
     checkpoint_every_epochs: PositiveInt = 1
     """Epochs that an interruption may cost."""
-
-    def thread_count(self, cpus: int) -> int:
-        """Threads of each training process on a cluster with this many CPUs, at least one."""
-        return max(1, cpus // self.workers) if self.threads == "all" else self.threads
 
 
 class CompareSettings(Section):

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import ray
+from ray.exceptions import RayError
 
 _POLL_SECONDS = 0.5
 
@@ -30,7 +31,7 @@ class Mailbox:
 def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
     """A mailbox whose messages are handed to `receive`, on a thread of the driver, until the block ends.
 
-    An error in `receive` is raised at the end of the block.
+    An error in `receive` keeps no later message from it; the first is raised at the end of the block.
     """
     actor: Any = ray.remote(Mailbox)
     box = actor.options(num_cpus=0).remote()
@@ -56,7 +57,12 @@ def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
 
 def _take(box: Any, receive: Callable[[Any], None], errors: list[Exception]) -> None:
     try:
-        for message in ray.get(box.take.remote()):
-            receive(message)
-    except Exception as error:  # noqa: BLE001 - crosses a thread; raised where the block ends
+        messages = ray.get(box.take.remote())
+    except RayError as error:
         errors.append(error)
+        return
+    for message in messages:
+        try:
+            receive(message)
+        except Exception as error:  # noqa: BLE001 - crosses a thread; raised where the block ends
+            errors.append(error)

@@ -14,7 +14,7 @@ from ray.train.torch import get_device, prepare_model
 
 from svaedc import checkpoint
 from svaedc.episodes import Episodes, split
-from svaedc.model import initialised
+from svaedc.model import SvaeDc, initialised
 from svaedc.presets import Preset, Sizes, preset
 from svaedc.sampling import Shard
 from svaedc.settings import TrainingSettings
@@ -39,7 +39,6 @@ class TrainingJob:
         updates: gradient updates of each stage; 0 for the preset's own number.
         stride: control steps between two samples.
         seed: of weights, order and draws.
-        threads: of torch, in each process.
         time_limit: seconds after which training stops at the end of an epoch.
         checkpoint_every: epochs between two checkpoints.
     """
@@ -52,25 +51,39 @@ class TrainingJob:
     updates: int
     stride: int
     seed: int
-    threads: int
     time_limit: float
     checkpoint_every: int
 
+    def __post_init__(self) -> None:
+        """Refuse paths that mean something else in another process."""
+        for name in ("dataset", "model", "cache"):
+            if not getattr(self, name).is_absolute():
+                raise ValueError(f"{name} must be an absolute path, got {getattr(self, name)}; resolve it")
+
     def data(self) -> TrainingCache:
-        """The training cache, decoded on this machine if it is not there yet."""
-        return training_cache(open_dataset(self.dataset), self.stride, self.cache)
+        """The training cache, decoded on this machine if it is not there yet.
+
+        Raises:
+            ValueError: the dataset is no longer the one that the job was planned for.
+        """
+        dataset = open_dataset(self.dataset)
+        cache = training_cache(dataset, self.stride, self.cache)
+        # Afterwards, because it may have grown meanwhile; shards never change, so now equal means equal then.
+        fingerprint = dataset.fingerprint()
+        if fingerprint != self.origin["dataset"]:
+            raise ValueError(
+                f"{self.dataset} has changed since this training was planned: its fingerprint was "
+                f"{self.origin['dataset'][:12]}, is {fingerprint[:12]}; let its collection end, then train "
+                "into another folder"
+            )
+        return cache
 
     def settings(self, cache: TrainingCache) -> Preset:
         """The preset for this data, with the job's seed and budget."""
         made = preset(self.preset)(Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2]))
         training = replace(made.training, seed=self.seed)
         if self.updates:
-            prior = self.updates if training.prior.updates else 0
-            training = replace(
-                training,
-                joint=replace(training.joint, updates=self.updates),
-                prior=replace(training.prior, updates=prior),
-            )
+            training = training.with_updates(self.updates, self.updates if training.prior.updates else 0)
         return Preset(made.model, training)
 
 
@@ -87,11 +100,19 @@ def bounds(dataset: Path) -> tuple[list[float], list[float]]:
 
 
 def run_worker(config: dict[str, Any]) -> None:
-    """Train as one of Ray Train's workers; rank 0 writes the checkpoints and sends the reports."""
-    job: TrainingJob = config["job"]
+    """Train as one of Ray Train's workers.
+
+    Args:
+        config: the `job`, the `threads` of torch and the `mailbox` for reports.
+    """
+    torch.set_num_threads(config["threads"])
+    trained(config["job"], config["mailbox"])
+
+
+def trained(job: TrainingJob, mailbox: Any) -> SvaeDc:
+    """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
     context = ray.train.get_context()
     shard = Shard(context.get_world_rank(), context.get_world_size())
-    torch.set_num_threads(job.threads)
     begin = time.monotonic()
     cache = job.data()
     training, held_out = episodes(cache)
@@ -105,13 +126,14 @@ def run_worker(config: dict[str, Any]) -> None:
         if shard.rank == 0:
             if late or report.is_last or report.epoch % job.checkpoint_every == 0:
                 checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
-            config["mailbox"].put.remote(_message(report))
+            mailbox.put.remote(_message(report))
         ray.train.report({"update": update})
         if late:
             break
     if shard.rank == 0:
         metadata = {**job.origin, "update": update, "versions": _versions()}
         checkpoint.save(job.model / MODEL, model, metadata)
+    return model
 
 
 def done(state: dict[str, Any], settings: TrainingSettings) -> int:

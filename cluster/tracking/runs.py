@@ -13,8 +13,9 @@ from types import TracebackType
 from typing import Any
 
 from mlflow import MlflowClient
-from mlflow.entities import Dataset, DatasetInput, InputTag, Metric, Param, RunTag
+from mlflow.entities import Dataset, DatasetInput, InputTag, LifecycleStage, Metric, Param, RunTag
 from mlflow.exceptions import MlflowException
+from mlflow.protos.databricks_pb2 import RESOURCE_DOES_NOT_EXIST, ErrorCode
 from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.errors import UserError
@@ -158,6 +159,21 @@ class Tracker:
         with self.reaching():
             self.client.update_run(run_id, status="RUNNING")
         return Run(self, run_id)
+
+    def holds(self, run_id: str) -> bool:
+        """Whether this experiment has the run, as another store, or one emptied since, does not.
+
+        Raises:
+            UserError: the store cannot be reached.
+        """
+        with self.reaching():
+            try:
+                found = self.client.get_run(run_id).info
+            except MlflowException as error:
+                if error.error_code == ErrorCode.Name(RESOURCE_DOES_NOT_EXIST):
+                    return False
+                raise
+        return found.experiment_id == self.experiment and found.lifecycle_stage == LifecycleStage.ACTIVE
 
     @contextmanager
     def reaching(self) -> Iterator[None]:

@@ -1,21 +1,19 @@
 """`svaedc train` on a real cluster, with a dataset small enough for seconds."""
 
 import json
-import os
+import shutil
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
-import psutil
+import numpy as np
 import pytest
 import torch
 
-from cluster.config import TrainSettings
+from cluster.config import TrackingSettings, TrainSettings
 from cluster.errors import UsageError, UserError
 from cluster.tracking import open_tracker
 from cluster.train import train
+from cluster.training_record import judge
 from svaedc import checkpoint
 
 
@@ -23,8 +21,14 @@ def settings(cache: Path, **changes) -> TrainSettings:
     return TrainSettings(**{"updates": 40, "threads": 1, "cache_folder": cache, **changes})
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory) -> Path:
+    """One for all tests: the dataset is decoded once."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.fixture
-def trained(ray_session, tracking_settings, franka_dataset, tmp_path):
+def run_train(ray_session, tracking_settings, franka_dataset, tmp_path, cache):
     """Trains into a folder of the test's own."""
 
     def run(name: str = "model", preset: str = "compact", folder: Path = franka_dataset, **changes) -> Path:
@@ -33,7 +37,7 @@ def trained(ray_session, tracking_settings, franka_dataset, tmp_path):
             model=tmp_path / name,
             preset=preset,
             seed=0,
-            settings=settings(tmp_path / "cache", **changes),
+            settings=settings(changes.pop("cache", cache), **changes),
             session=ray_session,
             tracker=open_tracker(tracking_settings),
         )
@@ -41,8 +45,50 @@ def trained(ray_session, tracking_settings, franka_dataset, tmp_path):
     return run
 
 
-def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(trained, tracking_settings, capsys):
-    path = trained()
+@pytest.fixture(scope="module")
+def ends(ray_session, franka_dataset, tmp_path_factory, cache) -> dict[str, Path]:
+    """Folders of a finished training and of one that its time limit ended half-way."""
+    folder = tmp_path_factory.mktemp("ends")
+    limits = {"finished": float("inf"), "half-way": 1e-6}
+    for name, limit in limits.items():
+        train(
+            folder=franka_dataset,
+            model=folder / name,
+            preset="compact",
+            seed=0,
+            settings=settings(cache, time_limit_seconds=limit),
+            session=ray_session,
+            tracker=open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db")),
+        )
+    return {name: folder / name for name in limits}
+
+
+@pytest.fixture
+def finished(ends, tmp_path) -> Path:
+    """The checkpoint of a finished training, in the folder that `run_train` uses."""
+    return shutil.copytree(ends["finished"], tmp_path / "model") / "model.pt"
+
+
+@pytest.fixture
+def half_way(ends, tmp_path) -> Path:
+    """The checkpoint of a training that goes on, in the folder that `run_train` uses."""
+    return shutil.copytree(ends["half-way"], tmp_path / "model") / "model.pt"
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return checkpoint.load(path)[0].state_dict()
+
+
+def same(first: dict[str, torch.Tensor], second: dict[str, torch.Tensor]) -> bool:
+    return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
+    run_train, tracking_settings, capsys
+):
+    before = signal.getsignal(signal.SIGINT)
+    path = run_train()
+    assert signal.getsignal(signal.SIGINT) is before
     model, metadata = checkpoint.load(path)
     assert metadata["setup"] == "franka"
     assert metadata["update"] == 80
@@ -57,62 +103,158 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(traine
     assert run.inputs.dataset_inputs[0].dataset.name == "franka"
     assert {artifact.path for artifact in client.list_artifacts(run.info.run_id)} >= {"figures", "model.pt"}
     capsys.readouterr()
-    assert trained() == path
+    assert run_train() == path
     assert "nothing to do" in capsys.readouterr().err
+    assert sorted(file.name for file in path.parent.iterdir()) == [
+        "metrics.json",
+        "model.pt",
+        "reconstruction.png",
+        "run.json",
+        "training.pt",
+    ]
 
 
-def test_two_processes_train_one_model(trained):
-    path = trained(workers=2)
+def test_two_processes_learn_what_one_does(run_train):
+    measured = [
+        json.loads((run_train(f"{count}", workers=count).parent / "metrics.json").read_text())["metrics"]
+        for count in (1, 2)
+    ]
+    assert measured[0]["rec_norm"] == pytest.approx(measured[1]["rec_norm"], rel=0.1)
+
+
+def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half_way, ends):
+    assert checkpoint.load(half_way)[1]["update"] == 40
+    path = run_train()
+    assert checkpoint.load(path)[1]["update"] == 80
+    assert json.loads(path.with_name("metrics.json").read_text())["update"] == 80
+    assert same(weights(path), weights(ends["finished"] / "model.pt"))
+
+
+def test_a_model_that_is_not_finished_says_that_the_command_goes_on(capsys):
+    judge({"collapsed": "", "episodes": 240, "update": 40}, updates=80)
+    assert "after 40 of 80 updates; the same command goes on" in capsys.readouterr().err
+
+
+def test_a_training_that_died_before_its_last_file_still_leaves_a_model(run_train, finished):
+    before = weights(finished)
+    finished.unlink()
+    assert same(before, weights(run_train()))
+
+
+def test_a_training_that_died_before_its_last_record_only_repeats_the_record(run_train, finished, capsys):
+    measures = finished.with_name("metrics.json")
+    written, trained_at = measures.read_text(), finished.stat().st_mtime_ns
+    measures.unlink()
+    run_train()
+    assert measures.read_text() == written
+    assert finished.stat().st_mtime_ns == trained_at
+    assert "held-out error" in capsys.readouterr().err
+
+
+def test_a_full_disk_while_recording_is_named_and_loses_nothing(run_train, finished):
+    finished.with_name("metrics.json").unlink()
+    finished.with_name(".unfinished-metrics.json").symlink_to("/dev/full")
+    with pytest.raises(UserError, match=r"No space left on device.*run the same command"):
+        run_train()
+    assert finished.exists()
+    assert run_train().with_name("metrics.json").exists()
+
+
+def test_a_collapsed_model_of_a_full_size_dataset_is_refused_every_time(run_train, finished):
+    measures = finished.with_name("metrics.json")
+    summary = json.loads(measures.read_text())
+    measures.write_text(json.dumps({**summary, "collapsed": "the model collapsed: x", "episodes": 10_000}))
+    for _ in range(2):
+        with pytest.raises(UserError, match=r"the model collapsed: x\. The checkpoint is kept"):
+            run_train()
+
+
+def test_a_collapsed_model_of_a_small_dataset_is_only_a_note(capsys):
+    judge({"collapsed": "the model collapsed: x", "episodes": 9_999, "update": 80}, updates=80)
+    assert "with only 9999 episodes: the model collapsed: x" in capsys.readouterr().err
+
+
+def test_other_updates_than_the_training_began_with_are_refused_naming_both(run_train, half_way):
+    assert half_way.exists()
+    with pytest.raises(UserError, match=r"joint\.updates was 40, is 50; .* another --model folder"):
+        run_train(updates=50)
+
+
+def test_a_finished_model_is_not_trained_over(run_train, finished):
+    finished.with_name("training.pt").unlink()
+    assert run_train() == finished
+    with pytest.raises(UserError, match="trained for 80 updates, not 100"):
+        run_train(updates=50)
+
+
+def test_training_goes_on_in_another_tracking_store_as_a_new_run(run_train, half_way, tracking_settings):
+    before = json.loads(half_way.with_name("run.json").read_text())["run"]
+    path = run_train()
+    [run] = open_tracker(tracking_settings).client.search_runs(["1"])
+    assert run.info.run_id == json.loads(path.with_name("run.json").read_text())["run"] != before
     assert checkpoint.load(path)[1]["update"] == 80
 
 
-def test_training_stops_at_its_time_limit_and_goes_on_from_there(trained, capsys):
-    path = trained(time_limit_seconds=1e-6)
-    assert checkpoint.load(path)[1]["update"] == 40
-    assert "the same command goes on" in capsys.readouterr().err
-    assert checkpoint.load(trained())[1]["update"] == 80
+def test_a_relative_cache_folder_is_the_driver_s(run_train, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    run_train(cache=Path("near"))
+    assert len(list((tmp_path / "near").glob("*-stride5"))) == 1
 
 
-def test_a_training_that_died_before_its_last_file_still_leaves_a_model(trained):
-    path = trained()
-    before = checkpoint.load(path)[0].state_dict()
-    path.unlink()
-    after = checkpoint.load(trained())[0].state_dict()
-    assert all(torch.equal(before[name], after[name]) for name in before)
+def test_a_model_that_is_a_file_is_refused(run_train, tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    for name in ("file", "file/below"):
+        with pytest.raises(UsageError, match=r"--model takes a folder, .*file.* is a file"):
+            run_train(name)
 
 
-def test_names_and_folders_that_do_not_exist_are_refused(trained, tmp_path):
+def test_numbers_that_are_not_finite_are_refused_by_episode(run_train, franka_dataset, tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    broken = tmp_path / "broken"
+    shutil.copytree(franka_dataset, broken)
+    victim = sorted(broken.glob("*.parquet"))[1]
+    table = pq.read_table(victim)
+    f = table.column("f").to_numpy().copy()
+    f[3] = np.nan
+    index = table.schema.get_field_index("f")
+    pq.write_table(table.set_column(index, table.schema.field(index), pa.array(f)), victim)
+    with pytest.raises(UserError, match=rf"{victim.name} holds NaN or infinity in f of episode 43"):
+        run_train(folder=broken, cache=tmp_path / "cache")
+
+
+def test_names_and_folders_that_do_not_exist_are_refused(run_train, tmp_path):
     with pytest.raises(UsageError, match="did you mean 'compact'"):
-        trained(preset="compcat")
+        run_train(preset="compcat")
     with pytest.raises(UserError, match="holds no dataset"):
-        trained(folder=tmp_path / "nowhere")
+        run_train(folder=tmp_path / "nowhere")
 
 
-def test_too_few_episodes_are_refused_with_the_number_needed(trained, small_dataset):
+def test_too_few_episodes_are_refused_with_the_number_needed(run_train, small_dataset):
     with pytest.raises(UserError, match="holds 16 episodes, training needs at least 200"):
-        trained(folder=small_dataset)
+        run_train(folder=small_dataset)
 
 
-def test_more_processes_than_cpus_are_refused_instead_of_hanging(trained):
+def test_more_processes_than_cpus_are_refused_instead_of_hanging(run_train):
     with pytest.raises(UserError, match="needs 8 CPUs"):
-        trained(workers=2, threads=4)
+        run_train(workers=2, threads=4)
 
 
-def test_a_folder_with_a_model_of_another_origin_is_refused(trained):
-    trained()
+def test_a_folder_with_a_model_of_another_origin_is_refused(run_train, finished):
     with pytest.raises(UserError, match="made for stride 5, not 10"):
-        trained(stride=10)
+        run_train(stride=10)
+    assert finished.exists()
 
 
-def test_a_damaged_checkpoint_is_named(trained):
-    path = trained()
-    path.unlink()
-    (path.parent / "training.pt").write_bytes(b"half a file")
+def test_a_damaged_checkpoint_is_named(run_train, finished):
+    finished.unlink()
+    finished.with_name("training.pt").write_bytes(b"half a file")
     with pytest.raises(UserError, match=r"training\.pt is damaged"):
-        trained()
+        run_train()
 
 
-def test_a_corrupt_shard_ends_training_before_it_starts(trained, franka_dataset, tmp_path):
+def test_a_corrupt_shard_ends_training_before_it_starts(run_train, franka_dataset, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()
     for path in franka_dataset.iterdir():
@@ -121,50 +263,4 @@ def test_a_corrupt_shard_ends_training_before_it_starts(trained, franka_dataset,
     victim = sorted(broken.glob("*.parquet"))[1]
     victim.write_bytes(victim.read_bytes()[:1000])
     with pytest.raises(UserError, match=victim.name):
-        trained(folder=broken)
-
-
-def command(dataset: Path, model: Path, root: Path) -> list[str]:
-    return [
-        *(sys.executable, "-m", "cluster", "train", "--dataset", str(dataset), "--model", str(model)),
-        *("--set", "train.updates=500", "--set", "train.threads=1"),
-        *(
-            "--set",
-            f"train.cache_folder={root / 'cache'}",
-            "--set",
-            f"tracking.uri=sqlite:///{root / 'mlflow.db'}",
-        ),
-    ]
-
-
-def wait_for(path: Path, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 240
-    while not path.exists():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def weights(folder: Path) -> dict[str, torch.Tensor]:
-    return checkpoint.load(folder / "model.pt")[0].state_dict()
-
-
-@pytest.mark.slow
-def test_killing_the_training_process_or_the_driver_changes_nothing(franka_dataset, tmp_path):
-    undisturbed = command(franka_dataset, tmp_path / "undisturbed", tmp_path)
-    subprocess.run(undisturbed, check=True, capture_output=True)
-    for victim in ("worker", "driver"):
-        line = command(franka_dataset, tmp_path / victim, tmp_path)
-        with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-            wait_for(tmp_path / victim / "training.pt", process)
-            if victim == "driver":
-                process.kill()
-            else:
-                children = psutil.Process(process.pid).children(recursive=True)
-                [rank] = [child for child in children if "RayTrainWorker" in " ".join(child.cmdline())]
-                os.kill(rank.pid, signal.SIGKILL)
-            process.communicate(timeout=400)
-        if victim == "driver":
-            subprocess.run(line, check=True, capture_output=True)
-        expected, found = weights(tmp_path / "undisturbed"), weights(tmp_path / victim)
-        assert all(torch.equal(expected[name], found[name]) for name in expected), victim
+        run_train(folder=broken, cache=tmp_path / "cache")

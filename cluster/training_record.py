@@ -1,0 +1,102 @@
+"""What remains of a training: its measures, a picture and the run's record; `metrics.json` comes last.
+
+Its presence says that nothing is missing, so whatever interrupts a recording, the next command repeats it.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from cluster import figures
+from cluster.errors import UserError
+from cluster.files import replacing
+from cluster.progress import say
+from cluster.tracking import Run
+from cluster.training_job import MODEL, TrainingJob, episodes
+from svaedc import checkpoint, diagnostics
+from workers.dataset.cache import TrainingCache
+from workers.dataset.folder import Dataset
+
+MEASURES = "metrics.json"
+FULL_SIZE = 10_000
+"""From here on a collapsed model is an error; below, it is expected often enough to be only reported."""
+
+
+def record(job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run) -> dict[str, Any]:
+    """Measure the model on all held-out episodes and keep what is found.
+
+    Returns:
+        What `metrics.json` holds: `metrics`, `collapsed` ("" or why), `episodes`, and the model's metadata.
+
+    Raises:
+        OSError: a file cannot be written.
+        UserError: the MLflow store cannot be used.
+    """
+    model, metadata = checkpoint.load(job.model / MODEL)
+    _, held_out = episodes(cache)
+    metrics = diagnostics.evaluate(model, held_out)
+    collapsed = diagnostics.collapse(metrics) or ""
+    figure = figures.reconstruction(job.model / "reconstruction.png", model, held_out, dataset.identity)
+    summary = {"metrics": metrics, "collapsed": collapsed, "episodes": len(cache.episode), **metadata}
+    run.metrics({f"final/{name}": value for name, value in metrics.items()}, step=metadata["update"])
+    run.figure(figure)
+    run.file(job.model / MODEL)
+    run.dict("model", summary)
+    run.tags({"svaedc.collapsed": collapsed or "no", "svaedc.device": _device()})
+    write_json(job.model / MEASURES, summary)
+    say(
+        f"{job.model / MODEL}: held-out error against the per-step median {metrics['rec_norm']:.2f} "
+        f"reconstructed, {metrics['gen_norm']:.2f} generated from x; correlation of y "
+        f"{metrics['corr_y_rec']:.2f} and {metrics['corr_y_gen']:.2f}; {metrics['active_dimensions']:.0f} of "
+        f"{model.config.tau_size} latent dimensions active; {run.url}"
+    )
+    return summary
+
+
+def recorded(folder: Path, update: int) -> dict[str, Any] | None:
+    """The measures of the model in a folder if they were recorded after that many updates."""
+    summary = read_json(folder / MEASURES)
+    return summary if summary.get("update") == update else None
+
+
+def judge(summary: dict[str, Any], updates: int) -> None:
+    """Say what is wrong with a recorded model.
+
+    Args:
+        summary: from `record` or `recorded`.
+        updates: that the whole training has.
+
+    Raises:
+        UserError: a model of a full-size dataset collapsed.
+    """
+    collapsed, count = summary["collapsed"], summary["episodes"]
+    if summary["update"] < updates:
+        say(
+            f"stopped at the time limit after {summary['update']} of {updates} updates; "
+            "the same command goes on"
+        )
+    if collapsed and count >= FULL_SIZE:
+        raise UserError(f"{collapsed}. The checkpoint is kept, but should not be used")
+    if collapsed:
+        say(f"note, with only {count} episodes: {collapsed}")
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a file as a whole; what was there stays when there is no room."""
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=2) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """What `write_json` wrote; nothing where there is none, or a damaged one that can be made again."""
+    try:
+        content = json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _device() -> str:
+    return "cuda" if torch.cuda.is_available() else "cpu"

@@ -1,0 +1,133 @@
+"""Hands a training job to Ray Train: what is heard of it meanwhile, what it survives, and what ends it."""
+
+import errno
+import shutil
+import signal
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from ray.train import ControllerError, RunConfig, ScalingConfig, TrainingFailedError, WorkerGroupError
+from ray.train.torch import TorchTrainer
+from ray.train.v2.api.config import FailureConfig
+
+from cluster.errors import UserError
+from cluster.mailbox import mailbox
+from cluster.placement import Placement
+from cluster.progress import ProgressLine, say
+from cluster.tracking import Run
+from cluster.training_job import TrainingJob, run_worker
+
+DEATHS = 3
+"""Deaths of training processes that one command survives, each from the last checkpoint."""
+_STARTS = 2
+"""Starts of the processes that Ray Train tries anew; each waits a minute for its room."""
+_WILL_RECUR = (ValueError, OSError, ArithmeticError, LookupError)
+"""What the core and the disk raise: another try would end the same way."""
+
+
+def submit(job: TrainingJob, placement: Placement, progress: ProgressLine, run: Run) -> None:
+    """Train until the job's budget or time limit is spent.
+
+    Raises:
+        UserError: training failed, or, once it has ended, the MLflow store failed meanwhile.
+    """
+    with mailbox(_Reports(progress, run).receive) as box:
+        for deaths in range(DEATHS + 1):
+            try:
+                _fit(job, placement, box)
+            except TrainingFailedError as error:
+                if deaths == DEATHS or not _is_death(error):
+                    raise UserError(_explanation(error, job)) from error
+                say(f"a training process died; going on from the last checkpoint ({deaths + 1} of {DEATHS})")
+            else:
+                return
+
+
+class _Reports:
+    """Passes the reports of epochs on to the person who watches and to the run."""
+
+    def __init__(self, progress: ProgressLine, run: Run) -> None:
+        self._progress, self._run = progress, run
+        self._complained = False
+
+    def receive(self, report: dict[str, Any]) -> None:
+        """Show and record one report; a store that fails is told once and ends nothing."""
+        metrics = report["metrics"]
+        self._progress.advance(
+            report["update"] - self._progress.done,
+            f"{report['stage']}, error against the median: reconstructed {metrics['held_out/rec_norm']:.2f}, "
+            f"generated {metrics['held_out/gen_norm']:.2f}",
+        )
+        try:
+            self._run.metrics(metrics, step=report["update"])
+        except UserError as error:
+            if not self._complained:
+                say(f"{error}. Training goes on; its curves will have gaps")
+            self._complained = True
+            raise
+
+
+def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
+    storage = job.model / ".ray-train"
+    trainer = TorchTrainer(
+        run_worker,
+        train_loop_config={"job": job, "threads": placement.cpus, "mailbox": box},
+        scaling_config=ScalingConfig(
+            num_workers=placement.processes,
+            use_gpu=placement.gpus > 0,
+            resources_per_worker={"CPU": placement.cpus},
+        ),
+        run_config=RunConfig(
+            name=uuid.uuid4().hex,
+            storage_path=str(storage),
+            failure_config=FailureConfig(max_failures=0, controller_failure_limit=_STARTS),
+        ),
+    )
+    try:
+        with interrupts_kept():
+            trainer.fit()
+    finally:
+        shutil.rmtree(storage, ignore_errors=True)
+
+
+@contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """Undoes what Ray Train does to Ctrl-C: its handler stays for good, and ends the program as a success."""
+    previous = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    except SystemExit as stop:
+        if stop.code:
+            raise
+        raise KeyboardInterrupt from None
+    finally:
+        if signal.getsignal(signal.SIGINT) is not previous:
+            signal.signal(signal.SIGINT, previous)
+
+
+def _is_death(error: TrainingFailedError) -> bool:
+    """Whether processes were lost, which another try survives; the errors of the others only follow."""
+    if not isinstance(error, WorkerGroupError):
+        return False
+    return not any(_recurs(failure) for failure in error.worker_failures.values())
+
+
+def _recurs(failure: Exception) -> bool:
+    return isinstance(failure, _WILL_RECUR) and not isinstance(failure, ConnectionError)
+
+
+def _explanation(error: TrainingFailedError, job: TrainingJob) -> str:
+    """One sentence and the remedy."""
+    if isinstance(error, ControllerError):
+        reason = str(error.controller_failure).partition("\n")[0]
+        return f"the training processes could not start: {reason}; try again when the cluster has room"
+    failures = list(getattr(error, "worker_failures", {}).values()) or [error]
+    cause = next((failure for failure in failures if _recurs(failure)), failures[0])
+    if isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT):
+        return (
+            f"training stopped: {cause}; free some space and run the same command: it goes on from the last "
+            f"checkpoint in {job.model}"
+        )
+    return f"training failed: {str(cause).strip().splitlines()[-1]}"

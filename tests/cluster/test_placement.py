@@ -1,0 +1,46 @@
+"""How processes share machines: by hand-made examples."""
+
+import pytest
+
+from cluster.errors import UserError
+from cluster.placement import Machine, Placement, place
+
+
+@pytest.mark.parametrize(
+    ("machines", "processes", "cpus"),
+    [
+        ([8], 1, 8),
+        ([8], 3, 2),
+        ([8, 8], 1, 8),
+        ([8, 8], 2, 8),
+        ([8, 8], 3, 4),
+        ([16, 4], 2, 8),
+        ([16, 4], 4, 4),
+        ([0, 5], 1, 5),
+    ],
+)
+def test_all_is_the_most_that_every_process_finds_on_one_machine(machines, processes, cpus):
+    assert place(processes, "all", [Machine(each) for each in machines]) == Placement(processes, cpus, 0)
+
+
+def test_a_number_of_cpus_is_taken_as_it_is():
+    assert place(2, 3, [Machine(8), Machine(8)]) == Placement(2, 3, 0)
+
+
+def test_every_process_takes_a_gpu_where_there_are_any():
+    machines = [Machine(8, gpus=1), Machine(32), Machine(4, gpus=1)]
+    assert place(2, "all", machines) == Placement(2, 4, 1)
+
+
+@pytest.mark.parametrize(
+    ("processes", "cpus", "machines", "message"),
+    [
+        (1, 16, [Machine(8), Machine(8)], r"needs 16 CPUs .*one machine; free are 8 CPUs, 8 CPUs"),
+        (2, "all", [Machine(1)], r"needs 2 CPUs .*free are 1 CPUs; lower train\.workers"),
+        (3, "all", [Machine(8, gpus=2)], r"needs 3 CPUs and 3 GPUs .*free are 8 CPUs and 2 GPUs"),
+        (1, "all", [], "free are none"),
+    ],
+)
+def test_work_without_room_is_refused_instead_of_waiting_for_ever(processes, cpus, machines, message):
+    with pytest.raises(UserError, match=message):
+        place(processes, cpus, machines)

@@ -1,0 +1,101 @@
+"""A job in the hands of Ray Train: its processes agree, and what ends it is told at once."""
+
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from ray.train import RunConfig, ScalingConfig
+from ray.train.torch import TorchTrainer
+
+from cluster.errors import UserError
+from cluster.mailbox import mailbox
+from cluster.placement import Placement
+from cluster.progress import ProgressLine
+from cluster.tracking import open_tracker
+from cluster.training_job import TrainingJob, trained
+from cluster.training_submission import interrupts_kept, submit
+from svaedc import checkpoint
+from workers.dataset.folder import open_dataset
+
+
+@pytest.fixture
+def job(franka_dataset, tmp_path) -> TrainingJob:
+    """A job as `train` plans it."""
+    (tmp_path / "model").mkdir()
+    return TrainingJob(
+        dataset=franka_dataset.resolve(),
+        model=tmp_path / "model",
+        cache=tmp_path / "cache",
+        origin={
+            "setup": "franka",
+            "dataset": open_dataset(franka_dataset).fingerprint(),
+            "preset": "compact",
+            "stride": 5,
+            "seed": 0,
+        },
+        preset="compact",
+        updates=40,
+        stride=5,
+        seed=0,
+        time_limit=float("inf"),
+        checkpoint_every=1,
+    )
+
+
+@pytest.mark.usefixtures("ray_session")
+def test_two_processes_train_one_model(job, tmp_path):
+    def save_copy(config):
+        import ray.train
+
+        model = trained(config["job"], config["mailbox"])
+        torch.save(model.state_dict(), config["folder"] / f"{ray.train.get_context().get_world_rank()}.pt")
+
+    with mailbox([].append) as box:
+        trainer = TorchTrainer(
+            save_copy,
+            train_loop_config={"job": job, "mailbox": box, "folder": tmp_path},
+            scaling_config=ScalingConfig(num_workers=2, resources_per_worker={"CPU": 1}),
+            run_config=RunConfig(storage_path=str(tmp_path / "ray")),
+        )
+        with interrupts_kept():
+            trainer.fit()
+    one, other = (torch.load(tmp_path / f"{rank}.pt", weights_only=True) for rank in range(2))
+    saved = checkpoint.load(job.model / "model.pt")[0].state_dict()
+    for name, value in saved.items():
+        assert torch.equal(one[name], value)
+        assert torch.equal(other[name], value)
+
+
+@pytest.mark.usefixtures("ray_session")
+def test_a_dataset_that_grew_since_the_plan_ends_training_at_the_first_try(tracking_settings, job, capsys):
+    planned = replace(job, origin={**job.origin, "dataset": "0" * 64})
+    with (
+        open_tracker(tracking_settings).run("train", "train", {}) as run,
+        ProgressLine("updates", 80, 0) as progress,
+        pytest.raises(UserError, match=r"has changed since this training was planned: .* was 000000000000"),
+    ):
+        submit(planned, Placement(1, 1, 0), progress, run)
+    assert "going on" not in capsys.readouterr().err
+
+
+def test_a_job_takes_no_relative_paths(job):
+    with pytest.raises(ValueError, match=r"cache must be an absolute path, got near"):
+        replace(job, cache=Path("near"))
+
+
+def test_what_ray_makes_of_ctrl_c_becomes_an_interrupt_again():
+    before = signal.getsignal(signal.SIGINT)
+
+    def leave(code: int) -> None:
+        with interrupts_kept():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            sys.exit(code)
+
+    with pytest.raises(KeyboardInterrupt):
+        leave(0)
+    with pytest.raises(SystemExit, match="143"):
+        leave(143)
+    assert signal.getsignal(signal.SIGINT) is before
