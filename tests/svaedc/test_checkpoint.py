@@ -88,9 +88,7 @@ def test_a_failed_write_keeps_the_old_checkpoint_and_leaves_no_file_behind(path,
 def test_a_full_disk_is_named_and_leaves_the_older_checkpoint(path, model):
     before = path.read_bytes()
     path.with_name(f".{path.name}.{os.getpid()}.tmp").symlink_to("/dev/full")
-    with pytest.raises(
-        OSError, match=r"cannot write a checkpoint: No space left.*model\.pt"
-    ) as full:
+    with pytest.raises(OSError, match=r"cannot write a checkpoint: No space left.*model\.pt") as full:
         checkpoint.save(path, model, METADATA)
     assert full.value.errno == errno.ENOSPC
     assert path.read_bytes() == before
