@@ -3,9 +3,11 @@
 import errno
 import shutil
 import signal
+import threading
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 from ray.train import ControllerError, RunConfig, ScalingConfig, TrainingFailedError, WorkerGroupError
@@ -94,17 +96,33 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
 
 @contextmanager
 def interrupts_kept() -> Iterator[None]:
-    """Undoes what Ray Train does to Ctrl-C: its handler stays for good, and ends the program as a success."""
-    previous = signal.getsignal(signal.SIGINT)
+    """Keeps the meaning of Ctrl-C and SIGTERM in the main thread.
+
+    Ray Train's handler for Ctrl-C exits, stays for good, and is not told apart from SIGTERM afterwards:
+    whatever code an exit had, it comes out of `ray.get` as 1.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interrupt, terminate = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    terminated = threading.Event()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        terminated.set()
+        if callable(terminate):
+            terminate(number, frame)
+
+    if callable(terminate):
+        signal.signal(signal.SIGTERM, note)
     try:
         yield
-    except SystemExit as stop:
-        if stop.code:
-            raise
+    except SystemExit:
+        if terminated.is_set():
+            raise SystemExit(128 + signal.SIGTERM) from None
         raise KeyboardInterrupt from None
     finally:
-        if signal.getsignal(signal.SIGINT) is not previous:
-            signal.signal(signal.SIGINT, previous)
+        signal.signal(signal.SIGINT, interrupt)
+        signal.signal(signal.SIGTERM, terminate)
 
 
 def _is_death(error: TrainingFailedError) -> bool:

@@ -43,14 +43,19 @@ def wait_for(path: Path, process: subprocess.Popen[str]) -> None:
         time.sleep(0.05)
 
 
-def test_ctrl_c_ends_training_at_once_and_says_that_it_goes_on(franka_dataset, tmp_path):
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_training_says_that_it_goes_on_and_nothing_else(
+    franka_dataset, tmp_path, number, code
+):
     line = command(franka_dataset, tmp_path / "model", tmp_path)
     with subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         wait_for(tmp_path / "model" / "training.pt", process)
-        os.killpg(process.pid, signal.SIGINT)
+        # Ctrl-C reaches every process of the terminal, SIGTERM only the one it is meant for.
+        (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
         _, told = process.communicate(timeout=120)
-    assert process.returncode == 130
-    assert told == "stopped: everything finished is kept, and the same command goes on from here\n"
+    assert process.returncode == code, told
+    lines = [each for each in told.splitlines() if " updates, " not in each]
+    assert lines == ["stopped: everything finished is kept, and the same command goes on from here"]
     assert not (tmp_path / "model" / "metrics.json").exists()
 
 

@@ -4,6 +4,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 
 import pytest
 import torch
@@ -86,16 +87,28 @@ def test_a_job_takes_no_relative_paths(job):
         replace(job, cache=Path("near"))
 
 
-def test_what_ray_makes_of_ctrl_c_becomes_an_interrupt_again():
-    before = signal.getsignal(signal.SIGINT)
+def test_ctrl_c_and_sigterm_keep_their_meaning_whatever_ray_makes_of_them():
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 
-    def leave(code: int) -> None:
+    def leave(number: int) -> None:
         with interrupts_kept():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-            sys.exit(code)
+            # Ray Train's handler, and what `ray.get` makes of every exit.
+            signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
+            try:
+                signal.raise_signal(number)
+            except SystemExit:
+                sys.exit(1)
 
-    with pytest.raises(KeyboardInterrupt):
-        leave(0)
-    with pytest.raises(SystemExit, match="143"):
-        leave(143)
-    assert signal.getsignal(signal.SIGINT) is before
+    def terminated(number: int, _: FrameType | None) -> None:
+        sys.exit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, terminated)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            leave(signal.SIGINT)
+        with pytest.raises(SystemExit, match="143"):
+            leave(signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is terminated
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
