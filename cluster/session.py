@@ -76,11 +76,11 @@ def connect(settings: RaySettings, address: str | None) -> Iterator[Session]:
         UsageError: the address is malformed.
     """
     wanted = address or os.environ.get("RAY_ADDRESS")
+    if wanted:
+        _join(settings, wanted)
+    else:
+        _start(settings)
     try:
-        if wanted:
-            _join(settings, wanted)
-        else:
-            _start(settings)
         with _terminating_as_exit():
             yield _session(is_local=not wanted)
     finally:
