@@ -3,6 +3,7 @@
 import logging
 import math
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ from typing import Any
 from ray import tune
 from ray.tune import Callback, FailureConfig, ResultGrid, RunConfig, Stopper, TuneConfig, Tuner
 
-from cluster.comparison_folder import disk_error
+from cluster.comparison_folder import disk_error, writing
 from cluster.comparison_job import ComparisonJob, RunTrainable
 from cluster.errors import UserError
 from cluster.progress import ProgressLine, say
@@ -21,6 +22,7 @@ from cluster.results import RunKey
 
 ERRORS = "errors.txt"
 _RUN_FAILURES = 2
+_COLOUR = re.compile(r"\x1b\[\d*m")
 _ENVIRONMENT = {
     "TUNE_DISABLE_SIGINT_HANDLER": "1",  # Ctrl-C is ours to handle
     "TUNE_DISABLE_AUTO_CALLBACK_LOGGERS": "1",  # records of our own make its files superfluous
@@ -131,8 +133,9 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
 
 
 def _failures(folder: Path, results: ResultGrid, asked: int) -> UserError:
-    texts = [str(error).strip() for error in results.errors]
-    (folder / ERRORS).write_text("\n\n".join(texts) + "\n")
+    texts = [_COLOUR.sub("", str(error)).strip() for error in results.errors]
+    with writing(folder):
+        (folder / ERRORS).write_text("\n\n".join(texts) + "\n")
     return UserError(
         f"{len(texts)} of {asked} runs kept failing, the first with: {texts[0].splitlines()[-1]}. "
         f"All errors are in {folder / ERRORS}. The other runs are kept, and the same command tries again"

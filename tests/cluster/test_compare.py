@@ -167,6 +167,7 @@ def command(folder: Path) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)]
 )
@@ -381,6 +382,21 @@ def test_a_store_that_fails_meanwhile_costs_no_run_and_is_caught_up_with(compare
     parents, children = mlflow_runs(tracking_settings)
     assert sorted(run.info.run_name for run in children) == ["random 1000", "random 1001", "random 1002"]
     assert {run.info.status for run in parents + children} == {"FINISHED"}
+
+
+def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_run(compared, tmp_path, capfd):
+    few = CompareSettings(slots=2, pool_size=3)
+    with pytest.raises(UserError, match=r"1 of 2 runs kept failing.*ValueError: all 3 candidates .* tried"):
+        compared("random,se", runs=1, trials=5, settings=few)
+    errors = (tmp_path / "out" / "errors.txt").read_text()
+    assert "candidates.py" in errors
+    assert {sign for sign in errors if not sign.isprintable()} == {"\n"}
+    assert len(recorded(RunKey("random", 1000).path(tmp_path / "out"))) == 7
+    assert len(recorded(RunKey("se", 1000).path(tmp_path / "out"))) == 5
+    said = capfd.readouterr()
+    assert said.out == ""
+    lines = [line for line in said.err.splitlines() if "best so far" not in line]
+    assert lines == ["run se 1000 failed and is tried again from its last trial"] * 2
 
 
 def test_the_standing_shows_every_method_in_the_order_asked_for():
