@@ -235,3 +235,18 @@ def test_models_that_do_not_fit_their_joints_are_refused():
         replace(daisy.ROBOT, home=daisy.HOME[1:])
     with pytest.raises(ValueError, match="all finite or all infinite"):
         replace(daisy.ROBOT, speeds=(1.0,) + daisy.UNLIMITED * 5 + daisy.UNLIMITED[1:])
+
+
+@pytest.mark.parametrize(
+    ("name", "speeds", "friction"),
+    [
+        ("daisy-27d", daisy.UNLIMITED, 2.0),
+        ("daisy-11d", daisy.UNLIMITED, 2.0),
+        ("daisy-11d-rehearsal", (3.142, 1.571, 3.142), 1.0),
+    ],
+)
+def test_only_the_rehearsal_has_the_true_speed_limits_and_slippery_ground(name, speeds, friction):
+    setup = setups.load(name)
+    with setup.open() as environment:
+        assert environment._robot_model.speeds == speeds * 6
+    assert setup.gap("paper").intervals["friction"] == (friction, friction)
