@@ -12,6 +12,9 @@ from workers.tasks.task import Task
 
 MODULES = {
     "franka": "workers.environments.franka",
+    "daisy-27d": "workers.environments.daisy_27d",
+    "daisy-11d": "workers.environments.daisy_11d",
+    "daisy-11d-rehearsal": "workers.environments.daisy_11d_rehearsal",
 }
 """A new robot is one module that offers `setup()`, and one line here."""
 

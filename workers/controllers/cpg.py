@@ -1,0 +1,158 @@
+"""Gaits from central pattern generators: coupled oscillators, one per joint (Crespi and Ijspeert 2008).
+
+    θ̇_i = 2π v_i + Σ_j w sin(θ_j − θ_i − φ_ij)
+    r̈_i = a (a/4 (R_i − r_i) − ṙ_i)
+    output_i = r_i (1 + cos θ_i) − o_i
+
+The amplitude r starts at R and at rest, and so stays there: r = R, whatever a. Every base is coupled to every
+other base, and each shoulder and elbow to the base of its leg, all with w = 10; θ starts at 0.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+from workers.controllers.controller import Command, Controller
+from workers.environments.environment import Channel
+
+LEGS = ("LF", "LM", "LB", "RB", "RM", "RF")
+"""Order of the oscillators, once around the body."""
+KINDS = ("base", "shoulder", "elbow")
+COUPLING = 10.0  # w, 1/s
+TIME_STEP = 0.01  # s of the oscillators' time in each control step
+ELBOW_CENTRE = -1.0  # rad, added to the elbows' outputs: the tibia points down
+
+_COMMAND_LEGS = [0, 5, 1, 4, 2, 3]  # oscillators in the order of the robot's legs: LF RF LM RM LB RB
+_SIDES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # left and right legs mirror each other
+
+
+@dataclass(frozen=True)
+class Gait:
+    """The numbers of a pattern generator; rows are base, shoulder and elbow, columns the legs in ring order.
+
+    Attributes:
+        shifts: rad; two coupled oscillators are in step when θ + shift is the same for both.
+        frequency: v of each row, in Hz of the oscillators' time.
+        amplitude: R of each row, in rad.
+        offset: o of each row, in rad.
+    """
+
+    shifts: Float[np.ndarray, "3 6"]
+    frequency: Float[np.ndarray, "3"]
+    amplitude: Float[np.ndarray, "3"]
+    offset: Float[np.ndarray, "3"]
+
+
+def phases(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
+    """θ after each of the Euler steps.
+
+    In ψ = θ + shift no coupling has a bias, and the sum over all bases needs one sine and cosine of each:
+    Σ_j sin(ψ_j − ψ_i) = cos ψ_i Σ_j sin ψ_j − sin ψ_i Σ_j cos ψ_j.
+    """
+    psi = np.array(gait.shifts)
+    free = TIME_STEP * 2 * pi * gait.frequency[:, None]
+    gain = TIME_STEP * COUPLING
+    course = np.empty((steps, 3, 6))
+    for step in range(steps):
+        base = psi[0]
+        sine, cosine = np.sin(base), np.cos(base)
+        pull = gain * np.sin(psi[1:] - base)
+        psi += free
+        base += gain * (cosine * sine.sum() - sine * cosine.sum()) + pull[0] + pull[1]
+        psi[1:] -= pull
+        course[step] = psi
+    return course - gait.shifts
+
+
+def outputs(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
+    """R (1 + cos θ) − o of every oscillator after each step, in rad."""
+    return gait.amplitude[:, None] * (1 + np.cos(phases(gait, steps))) - gait.offset[:, None]
+
+
+class PatternGenerator(Controller):
+    """Joint angles of a hexapod from a pattern generator that is not fed back.
+
+    A left leg's joint is commanded direction · output (the elbow −1 + direction · output), a right leg's the
+    opposite of that; all are clipped to ± the limits.
+
+    Args:
+        parameters: of the controller.
+        gait: from their values to the pattern generator.
+        directions: +1 or −1 for base, shoulder and elbow.
+        limits: greatest commanded angle of base, shoulder and elbow, in rad.
+    """
+
+    def __init__(
+        self,
+        *,
+        parameters: tuple[Channel, ...],
+        gait: Callable[[Float[np.ndarray, " d"]], Gait],
+        directions: tuple[float, float, float],
+        limits: tuple[float, float, float],
+    ) -> None:
+        self.parameters = parameters
+        self._gait = gait
+        self._directions = np.array(directions)[:, None]
+        self._limits = np.array(limits)
+
+    def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
+        """Plan all commands at once: nothing that happens to the robot changes them."""
+        rows = self.commands(x, horizon)
+
+        def command(step: int) -> list[float]:
+            return rows[step].tolist()
+
+        return command
+
+    def commands(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "horizon 18"]:
+        """Joint angles in rad: legs LF RF LM RM LB RB, each with base, shoulder, elbow."""
+        left = self._directions * outputs(self._gait(self.values(x)), horizon)
+        left[:, 2] += ELBOW_CENTRE
+        angles = (left[:, :, _COMMAND_LEGS] * _SIDES).transpose(0, 2, 1)
+        return np.clip(angles, -self._limits, self._limits).reshape(horizon, -1)
+
+
+def _shifts(base: Float[np.ndarray, "6"], joints: Float[np.ndarray, "2 #6"]) -> Float[np.ndarray, "3 6"]:
+    """Base phases, and by how much each shoulder and elbow lags behind its base."""
+    return np.vstack([-base, joints - base])
+
+
+def _phase(*names: str) -> tuple[Channel, ...]:
+    return tuple(Channel(f"{name}_phase", "rad", -pi, pi) for name in names)
+
+
+BASE_PHASES = _phase(*(f"{leg}_base" for leg in LEGS))
+
+
+def cpg_27d(limits: tuple[float, float, float]) -> PatternGenerator:
+    """18 phases; frequency, amplitude and offset of bases, shoulders and elbows."""
+    joints = _phase(*(f"{leg}_{kind}" for kind in KINDS[1:] for leg in LEGS))
+    waves = [("frequency", "Hz", 2.0), ("amplitude", "rad", 1.0), ("offset", "rad", 1.0)]
+    shared = (Channel(f"{kind}_{name}", unit, 0.0, high) for name, unit, high in waves for kind in KINDS)
+
+    def gait(values: Float[np.ndarray, "27"]) -> Gait:
+        shifts = _shifts(values[:6], values[6:18].reshape(2, 6))
+        return Gait(shifts, *values[18:].reshape(3, 3))
+
+    parameters = (*BASE_PHASES, *joints, *shared)
+    return PatternGenerator(parameters=parameters, gait=gait, directions=(1.0, 1.0, 1.0), limits=limits)
+
+
+def cpg_11d(limits: tuple[float, float, float]) -> PatternGenerator:
+    """6 base phases; the phases of all shoulders and of all elbows behind them; one wave for all joints."""
+    waves = (
+        Channel("frequency", "Hz", 0.5, 1.0),
+        Channel("amplitude", "rad", 0.5, 1.0),
+        Channel("offset", "rad", 0.5, 1.0),
+    )
+
+    def gait(values: Float[np.ndarray, "11"]) -> Gait:
+        shifts = _shifts(values[:6], values[6:8, None])
+        return Gait(shifts, *np.repeat(values[8:, None], 3, axis=1))
+
+    parameters = (*BASE_PHASES, *_phase(*KINDS[1:]), *waves)
+    return PatternGenerator(parameters=parameters, gait=gait, directions=(-1.0, -1.0, 1.0), limits=limits)

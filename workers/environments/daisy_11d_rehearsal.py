@@ -1,0 +1,26 @@
+"""A stand-in for the paper's real Daisy: the setup `daisy-11d-rehearsal`, which differs from `daisy-11d`.
+
+The motors have their true limits of speed and the ground is more slippery. Nothing stops an episode early.
+"""
+
+from workers.controllers.cpg import cpg_11d
+from workers.environments.daisy import NOMINAL, TRUE_SPEEDS, DaisyModel
+from workers.environments.daisy_11d import HORIZON, REACH
+from workers.environments.daisy_setup import walking
+from workers.setups import Setup
+
+MODEL = DaisyModel(speeds=TRUE_SPEEDS, reach=REACH)
+FRICTION = 1.0  # of rubber on carpet; half of what the data are collected under
+OBJECTIVE_LIMITS = (-80.0, 80.0)
+
+
+def setup() -> Setup:
+    """The setup `daisy-11d-rehearsal`: 11 parameters, 3.142, 1.571 and 3.142 rad/s at most."""
+    return walking(
+        name="daisy-11d-rehearsal",
+        model=MODEL,
+        controller=cpg_11d(REACH),
+        horizon=HORIZON,
+        nominal={**NOMINAL, "friction": FRICTION},
+        objective_limits=OBJECTIVE_LIMITS,
+    )
