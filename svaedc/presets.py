@@ -61,11 +61,11 @@ def paper(sizes: Sizes) -> Preset:
 def compact(sizes: Sizes) -> Preset:
     """Ours: low-rank head around the median, MLP prior refitted in a second stage; minutes on two cores.
 
-    Meant for a stride that leaves about 100 steps. On 8,100 Franka episodes, measured on 900 others in about
-    100 CPU seconds with one thread, two seeds: error relative to the median's .43 and .43 reconstructed, .73
-    and .71 generated from x; correlation of y .98 and .98 reconstructed, .80 and .81 generated; all 9 latent
-    dimensions active. Stage two with wider networks, other activations, weight decay up to 1, mixed or noisy
-    x stayed within .72 and .75 of the generated error (seed 0): the data are the limit.
+    Meant for a stride that leaves about 100 steps. On 8,100 Franka episodes, measured on 900 others after
+    about 100 CPU seconds with one thread, two seeds: error relative to the median's .43 and .43
+    reconstructed, .73 and .71 generated from x; correlation of y .98 and .98 reconstructed, .80 and .81
+    generated; all 9 latent dimensions active. Wider networks, other activations, weight decay up to 1, and
+    mixed or noisy x in stage two left the generated error of the first seed between .71 and .75.
     """
     joint = StageSettings(
         updates=3_000,
