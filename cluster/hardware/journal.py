@@ -244,4 +244,4 @@ def _trial(row: tuple[Any, ...]) -> Trial:
 
 def _event(row: tuple[Any, ...]) -> Event:
     seq, trial, old, new, *rest = row
-    return Event(seq, trial, State(old) if old else None, State(new), *rest)
+    return Event(seq, trial, None if old is None else State(old), State(new), *rest)
