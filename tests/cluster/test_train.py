@@ -114,6 +114,7 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     ]
 
 
+@pytest.mark.slow
 def test_two_processes_learn_what_one_does(run_train):
     measured = [
         json.loads((run_train(f"{count}", workers=count).parent / "metrics.json").read_text())["metrics"]
@@ -187,6 +188,7 @@ def test_a_finished_model_is_not_trained_over(run_train, finished):
         run_train(updates=50)
 
 
+@pytest.mark.slow
 def test_training_goes_on_in_another_tracking_store_as_a_new_run(run_train, half_way, tracking_settings):
     before = json.loads(half_way.with_name("run.json").read_text())["run"]
     path = run_train()
@@ -195,6 +197,7 @@ def test_training_goes_on_in_another_tracking_store_as_a_new_run(run_train, half
     assert checkpoint.load(path)[1]["update"] == 80
 
 
+@pytest.mark.slow
 def test_a_relative_cache_folder_is_the_driver_s(run_train, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     run_train(cache=Path("near"))
