@@ -42,22 +42,11 @@ Runs = Sequence[tuple[RunKey, list[Trial]]]
 
 def append(path: Path, trial: Trial) -> None:
     """Add a trial to a run's record; it is on disk when this returns."""
-    line = {
-        "trial": trial.index,
-        "f": trial.f,
-        "y": trial.y,
-        "best": trial.best,
-        "success": trial.success,
-        "status": trial.status,
-        "seconds": trial.seconds,
-        "stop": trial.stop,
-        "x": [float(value) for value in trial.x],
-    }
     with path.open("ab+") as file:
         # A worker whose driver died may still be at it.
         fcntl.flock(file, fcntl.LOCK_EX)
         _drop_torn_line(file)
-        file.write(json.dumps(line).encode() + b"\n")
+        file.write(json.dumps(_fields(trial)).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
 
@@ -119,24 +108,25 @@ def rows(runs: Runs) -> list[Row]:
 def write_table(folder: Path, runs: Runs, *, setup: str, gap: str) -> Path:
     """`trials.parquet`: one row per trial of all runs."""
     records = [
-        {
-            "setup": setup,
-            "gap": gap,
-            "method": key.method,
-            "run": key.run,
-            "trial": trial.index,
-            "f": trial.f,
-            "y": trial.y,
-            "best": trial.best,
-            "success": trial.success,
-            "status": trial.status,
-            "seconds": trial.seconds,
-            "stop": trial.stop,
-            "x": trial.x.tolist(),
-        }
+        {"setup": setup, "gap": gap, "method": key.method, "run": key.run, **_fields(trial)}
         for key, trials in runs
         for trial in trials
     ]
     with replacing(folder / TABLE) as path:
         pq.write_table(pa.Table.from_pylist(records), path, compression="zstd")
     return folder / TABLE
+
+
+def _fields(trial: Trial) -> dict[str, Any]:
+    """A trial as plain values, in the order of the table."""
+    return {
+        "trial": trial.index,
+        "f": trial.f,
+        "y": trial.y,
+        "best": trial.best,
+        "success": trial.success,
+        "status": trial.status,
+        "seconds": trial.seconds,
+        "stop": trial.stop,
+        "x": trial.x.tolist(),
+    }
