@@ -18,11 +18,12 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     |---|---|
     | action | the setup's command channels, in their units, clipped to their bounds |
     | observation | ξ at this step: the setup's observation channels, in their units |
-    | reward | 0 in every step but the last, where it is f over the whole episode |
+    | reward | 0 in every step but the last, where it is f of the whole episode |
     | start | the setup's start pose; physics drawn from the ranges of data collection |
-    | end | truncated after the setup's horizon |
+    | end | truncated after the setup's horizon; terminated when the setup's stop rule has a reason |
 
-    `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's `physics`.
+    `info` holds `bad`, whether a bad condition holds, after `reset` the episode's `physics`, and when
+    terminated the reason as `stop`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -50,9 +51,11 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         command: Sequence[float] = np.clip(action, self._commands.low, self._commands.high).tolist()
         self._records.append(self._environment.step(command))
         observed = self._environment.observed(self._records[-1:])
-        ended = len(self._records) >= self._setup.horizon
-        bad = bool(self._setup.task.is_bad(observed).any())
-        return self._row(observed), self._objective() if ended else 0.0, False, ended, {"bad": bad}
+        reason = self._setup.stop(observed)
+        truncated = not reason and len(self._records) >= self._setup.horizon
+        info = {"bad": bool(self._setup.task.is_bad(observed).any())} | ({"stop": reason} if reason else {})
+        reward = self._objective(reason) if reason or truncated else 0.0
+        return self._row(observed), reward, bool(reason), truncated, info
 
     def close(self) -> None:
         """End the simulation."""
@@ -61,9 +64,11 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     def _row(self, observed: Observed) -> np.ndarray:
         return np.clip(observed.xi[:, 0], self._seen.low, self._seen.high)
 
-    def _objective(self) -> float:
+    def _objective(self, reason: str) -> float:
+        task = self._setup.task
         whole = self._environment.observed(self._records)
-        return self._setup.task.objective(whole, self._setup.task.is_bad(whole))
+        objective = task.stopped_objective if reason else task.objective
+        return objective(whole, task.is_bad(whole))
 
 
 def _box(channels: Sequence[Channel]) -> spaces.Box:

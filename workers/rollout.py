@@ -11,15 +11,17 @@ Example:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
-from workers.controllers.controller import unit_cube
+from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
+from workers.tasks.stop import never
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -37,7 +39,8 @@ class Episode:
         bad: per step, one bit for each bad condition.
         y: badness, the fraction of bad steps, in [0, 1].
         f: the objective.
-        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded.
+        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded, or
+            the reason of the setup's stop rule. From there on its last state is repeated.
         physics: the parameters it ran under.
     """
 
@@ -65,9 +68,12 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     controller = unit_cube(x, setup.dimensions)
     environment.reset(physics)
     command = setup.controller.start(controller, environment, setup.horizon)
-    step = environment.step
-    records = [step(command(t)) for t in range(setup.horizon)]
-    return _episode(setup, environment.observed(records), controller, physics)
+    if setup.stop is never:
+        step = environment.step
+        records, reason = [step(command(t)) for t in range(setup.horizon)], ""
+    else:
+        records, reason = _guarded(setup, environment, command)
+    return _episode(setup, environment.observed(records), reason, controller, physics)
 
 
 def random_episode(setup: Setup, environment: Environment, seed: int, index: int) -> Episode:
@@ -76,18 +82,30 @@ def random_episode(setup: Setup, environment: Environment, seed: int, index: int
     return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
 
 
-def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) -> Episode:
+def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
+    """Records up to the step at which the setup's rule stops, the last one repeated, and the reason."""
+    records = []
+    for t in range(setup.horizon):
+        records.append(environment.step(command(t)))
+        reason = setup.stop(environment.observed(records[-1:]))
+        if reason:
+            return records + records[-1:] * (setup.horizon - len(records)), reason
+    return records, ""
+
+
+def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:
     sane = _sane_steps(observed.xi, setup.observation)
     if sane < setup.horizon:
         return _diverged(setup, observed, sane, x, physics)
     is_bad = setup.task.is_bad(observed)
+    objective = setup.task.stopped_objective if reason else setup.task.objective
     return Episode(
         x=x,
         xi=observed.xi,
         bad=_bits(is_bad),
         y=float(is_bad.any(axis=0).mean()),
-        f=float(np.float32(setup.task.objective(observed, is_bad))),
-        stop="",
+        f=float(np.float32(objective(observed, is_bad))),
+        stop=reason,
         physics=physics,
     )
 

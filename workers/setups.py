@@ -8,6 +8,7 @@ from importlib import import_module
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges
+from workers.tasks.stop import StopRule, never
 from workers.tasks.task import Task
 
 MODULES = {
@@ -32,6 +33,7 @@ class Setup:
         gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
         objective_limits: the range of f, fixed; BO scales f by it.
         success: an episode with f above this succeeded.
+        stop: ends an episode early; of stand-ins for hardware only.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Setup:
     gaps: Mapping[str, PhysicsRanges]
     objective_limits: tuple[float, float]
     success: float
+    stop: StopRule = never
 
     @property
     def dimensions(self) -> int:

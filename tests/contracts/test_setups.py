@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from workers.gymnasium_environment import SetupEnvironment
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
 from workers.rollout import Episode, random_episode, rollout
+from workers.tasks.stop import never
 
 
 @pytest.fixture(scope="module", params=sorted(setups.MODULES))
@@ -65,7 +67,11 @@ def test_trajectories_have_the_channels_and_the_horizon_of_the_setup(setup, epis
         assert episode.x.shape == (setup.dimensions,)
         assert episode.x.dtype == np.float32
         assert episode.bad.shape == (setup.horizon,)
-        assert episode.stop == ""
+        assert episode.stop == "" or setup.stop is not never
+
+
+def test_only_stand_ins_for_hardware_end_early(setup):
+    assert (setup.stop is never) or setup.name.endswith("-rehearsal")
 
 
 def test_trajectories_stay_within_the_bounds_of_their_channels(setup, episodes):
@@ -96,18 +102,30 @@ def test_different_controllers_move_differently(episodes):
     assert len({_bytes(episode) for episode in episodes}) == len(episodes)
 
 
-def test_every_physics_parameter_changes_the_trajectory(setup, environment, episodes):
-    """Over a few controllers, since one need not touch every object."""
+def test_every_physics_parameter_changes_the_trajectory(setup, environment):
+    """Over some controllers, since one need not touch every object, let alone tip it over."""
+    if setup.stop is not never:
+        pytest.skip(
+            "its rolls rarely fall, which shows restitution; physics are those of the setup it stands for"
+        )
     nominal = _nominal(setup)
-    controllers = [episode.x for episode in episodes]
-    unchanged = [rollout(setup, environment, x, nominal).xi for x in controllers]
+
+    @cache
+    def controller(index: int) -> np.ndarray:
+        return generator(0, "controller", index).random(setup.dimensions, dtype=np.float32)
+
+    @cache
+    def unchanged(index: int) -> np.ndarray:
+        return rollout(setup, environment, controller(index), nominal).xi
+
+    def differs(index: int, physics: dict[str, float]) -> bool:
+        return not np.array_equal(
+            rollout(setup, environment, controller(index), physics).xi, unchanged(index)
+        )
+
     for name, value in nominal.items():
         varied = nominal | {name: value * 1.05}
-        differs = (
-            not np.array_equal(rollout(setup, environment, x, varied).xi, xi)
-            for x, xi in zip(controllers, unchanged, strict=True)
-        )
-        assert any(differs), f"{name} changes nothing"
+        assert any(differs(index, varied) for index in range(100)), f"{name} changes nothing"
 
 
 def test_physics_with_an_unknown_or_missing_parameter_is_refused(setup, environment):

@@ -24,3 +24,7 @@ class Task(ABC):
     @abstractmethod
     def objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:
         """f, the number Bayesian optimisation maximises."""
+
+    def stopped_objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:
+        """The objective of an episode that a stop rule ended; from there on its last state is repeated."""
+        return self.objective(observed, bad)
