@@ -13,6 +13,9 @@ from workers.tasks.task import Task
 
 MODULES = {
     "franka": "workers.environments.franka",
+    "franka-rehearsal": "workers.environments.franka_rehearsal",
+    "yumi": "workers.environments.yumi",
+    "yumi-rehearsal": "workers.environments.yumi_rehearsal",
 }
 """A new robot is one module that offers `setup()`, and one line here."""
 
