@@ -145,7 +145,9 @@ def compare(
     trials: Annotated[
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
     ] = 20,
-    gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
+    gap: Annotated[
+        str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
+    ] = "paper",
     model: TrainedModel = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,

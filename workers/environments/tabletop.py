@@ -8,8 +8,9 @@ from struct import Struct
 import numpy as np
 from jaxtyping import Float
 
+from workers.environments.drive import Drive
 from workers.environments.environment import Channel, Environment, Observed
-from workers.physics import Physics
+from workers.physics import Physics, PhysicsRanges, around
 from workers.simulation.arm import Arm, ArmModel
 from workers.simulation.cylinder import Cylinder
 from workers.simulation.world import World
@@ -31,14 +32,14 @@ class TabletopModel:
 
     Attributes:
         arm: the robot.
-        torque_limits: N·m, of each moving joint; commands beyond them are clipped.
+        drive: what a command means, and its limits.
         cylinders: the objects to push.
         control_step: seconds, also the step of the simulation.
         solver_iterations: of the contact solver in each step.
     """
 
     arm: ArmModel
-    torque_limits: tuple[float, ...]
+    drive: Drive
     cylinders: tuple[CylinderModel, ...]
     control_step: float
     solver_iterations: int
@@ -49,6 +50,17 @@ class TabletopModel:
             f"object{number}_{name}": value
             for number, cylinder in enumerate(self.cylinders, 1)
             for name, value in cylinder.nominal.items()
+        }
+
+    def gaps(self) -> dict[str, PhysicsRanges]:
+        """Levels of the sim-to-real gap; `paper` varies all but the rolling friction."""
+        nominal = self.nominal_physics()
+        training = around(nominal, 0.05)
+        fixed = {name: (value, value) for name, value in nominal.items() if "rolling" in name}
+        return {
+            "paper": PhysicsRanges({**training.intervals, **fixed}),
+            "training": training,
+            "wide": around(nominal, 0.2),
         }
 
     def observation(self) -> tuple[Channel, ...]:
@@ -63,9 +75,9 @@ class TabletopModel:
         return (*joints, *objects)
 
     def action(self) -> tuple[Channel, ...]:
-        """Joint torques in N·m."""
-        limits = zip(self.arm.joints, self.torque_limits, strict=True)
-        return tuple(Channel(name, "N·m", -limit, limit) for name, limit in limits)
+        """One number per joint that moves."""
+        limits = zip(self.arm.joints, self.drive.limits, strict=True)
+        return tuple(Channel(name, self.drive.unit, -limit, limit) for name, limit in limits)
 
 
 def _object_channels(name: str) -> list[Channel]:
@@ -98,6 +110,7 @@ class Tabletop(Environment):
         model = self._model
         self._world = World(time_step=model.control_step, solver_iterations=model.solver_iterations)
         self.arm = Arm(self._world, model.arm)
+        self._apply = model.drive.bind(self.arm)
         self._layout = Struct(f"{len(model.arm.joints) + 7 * len(model.cylinders) + 4}d")
         self._cylinders = [
             Cylinder(self._world, radius=c.radius, height=c.height, position=c.start) for c in model.cylinders
@@ -128,8 +141,8 @@ class Tabletop(Environment):
         )
 
     def step(self, command: Sequence[float]) -> Record:
-        """Apply joint torques for one control step."""
-        self.arm.apply_torque(command)
+        """Drive the joints for one control step."""
+        self._apply(command)
         self._world.step()
         return self.record()
 
