@@ -159,7 +159,7 @@ def test_a_writer_killed_at_any_moment_leaves_a_dataset_that_a_rerun_completes(t
         folder = tmp_path / "killed"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        died = subprocess.run([sys.executable, "-c", KILLED_AT, str(folder), str(moment)], timeout=60)
+        died = subprocess.run([sys.executable, "-c", KILLED_AT, str(folder), str(moment)], timeout=180)
         if died.returncode == 0:
             survived_after = moment
             break
