@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# No test asserts a time, the machine may be busy; and the same examples every time, so that a failure belongs to
-# the change that caused it; `make test-slow` explores new ones.
+# No test asserts a time, the machine may be busy; and the same examples every time, so that a failure belongs
+# to the change that caused it: `make test-slow` explores new ones.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("repeatable", settings.get_profile("untimed"), derandomize=True)
 settings.register_profile("exploring", settings.get_profile("untimed"), max_examples=500)
