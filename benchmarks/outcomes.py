@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from itertools import chain, repeat
 
 import numpy as np
-import pybullet
 
 from workers import setups
 from workers.rollout import DIVERGED, Episode, random_episode
+from workers.simulation.bullet import pybullet
 from workers.simulation.world import World
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
