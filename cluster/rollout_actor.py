@@ -30,7 +30,12 @@ class RolloutActor:
     def _require_same_code(self) -> None:
         """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""
         asked = self._dataset.identity
-        own = identity_of(self._setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard)
+        own = identity_of(
+            self._setup,
+            seed=asked.seed,
+            episodes_per_shard=asked.episodes_per_shard,
+            repeats=asked.repeats,
+        )
         differences = asked.differences(own)
         if differences:
             raise ValueError(
