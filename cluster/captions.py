@@ -36,4 +36,4 @@ def _write(
     draw: ImageDraw.ImageDraw, place: tuple[int, int], anchor: str, text: str, colour: tuple[int, int, int]
 ) -> None:
     font = ImageFont.load_default(max(11, draw.im.size[1] // 18))
-    draw.text(place, text, fill=colour, font=font, anchor=anchor, stroke_width=2, stroke_fill=_PAPER)
+    draw.text(place, text, fill=colour, font=font, anchor=anchor, stroke_width=1, stroke_fill=_PAPER)

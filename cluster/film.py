@@ -14,7 +14,7 @@ Picture = UInt8[np.ndarray, "height width 3"]
 
 STILLS, CLIPS = (".png",), (".gif", ".mp4")
 PER_ROW = 3
-COLOURS = 96  # of a GIF; more cost space and are hardly seen
+COLOURS = 64  # of a GIF; more cost space and are hardly seen
 HOLD = 1  # s that the last picture of a clip stays
 _SAMPLES = 16  # pictures that a GIF's colours are chosen from
 

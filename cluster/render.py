@@ -14,7 +14,7 @@ from workers.pictures import Size, frames
 from workers.rollout import Episode
 from workers.setups import Setup
 
-SHORTEST, LONGEST = 5.0, 10.0  # s of a clip whose speed nobody chose
+SHORTEST, LONGEST = 5.0, 8.0  # s of a clip whose speed nobody chose
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Moment:
 
 
 def usual_speed(setup: Setup) -> float:
-    """That of life if a clip then lasts 5 to 10 s, and the nearest that makes it so otherwise."""
+    """That of life if a clip then lasts 5 to 8 s, and the nearest that makes it so otherwise."""
     seconds = setup.horizon * setup.control_step
     return seconds / min(max(seconds, SHORTEST), LONGEST)
 

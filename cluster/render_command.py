@@ -10,8 +10,8 @@ from cluster.options import SetupName, durable, setup_of
 from cluster.progress import say
 
 X_HELP = "random:SEED, dataset:FOLDER:INDEX, an .npy file, or D numbers in [0, 1] separated by commas."
-SEED_HELP = "Draws the physics as data collection does. Without it: that of the dataset's episode, or the nominal one."
-SPEED_HELP = "Of a clip; 0.2 is five times slower than life. Without it, a clip lasts 5 to 10 s."
+SEED_HELP = "Draws the physics as data collection does. Without it: the dataset episode's own, or nominal."
+SPEED_HELP = "Of a clip; 0.2 is five times slower than life. Without it, a clip lasts 5 to 8 s."
 
 
 def render(
@@ -24,8 +24,8 @@ def render(
     speed: Annotated[float | None, typer.Option("--speed", help=SPEED_HELP)] = None,
     fps: Annotated[int, typer.Option("--fps", min=1, max=50, help="Pictures per second of a clip.")] = 10,
     stills: Annotated[int, typer.Option("--stills", min=1, max=60, help="Pictures of a .png.")] = 6,
-    width: Annotated[int, typer.Option("--width", help="Pixels of each picture.")] = 400,
-    height: Annotated[int, typer.Option("--height", help="Pixels of each picture.")] = 300,
+    width: Annotated[int, typer.Option("--width", help="Pixels of each picture.")] = 360,
+    height: Annotated[int, typer.Option("--height", help="Pixels of each picture.")] = 270,
 ) -> None:
     """Show an episode of any setup as a clip or as stills; needs no screen.
 
@@ -58,7 +58,7 @@ def render(
     if out.suffix in STILLS:
         moments, note = chosen_stills(robot, episode, stills), robot.name
     else:
-        moments, note = clip(robot, episode, pace, fps), f"{robot.name} {pace:.2g}×"
+        moments, note = clip(robot, episode, pace, fps), f"{robot.name} {pace:.2g}x"
     out.parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as unfinished:
         write(unfinished, out.suffix, pictures(robot, episode, moments, size, note), fps)

@@ -44,7 +44,7 @@ ROBOT = HexapodModel(
 SCENERY = Scenery(
     bodies=(Machine(ROBOT.urdf, JOINTS, "body"),),
     ground=Ground(0.5, (-WALKWAY, WALKWAY), (-math.inf, math.inf), numbered=(WALKWAY,)),
-    camera=Camera(target=(0.0, 0.0, 0.1), follows="body", distance=2.5, yaw=40.0, pitch=-32.0, angle=38.0),
+    camera=Camera(target=(0.0, 0.0, 0.22), follows="body", distance=2.8, yaw=40.0, pitch=-32.0, angle=38.0),
 )
 
 

@@ -81,7 +81,7 @@ class TabletopModel:
             bodies=(arm, *rolls),
             ground=Ground(0.1, *self.table, numbered=()),
             camera=Camera(
-                target=(0.8 * x, 0.0, 0.22),
+                target=(x, 0.0, 0.22),
                 follows="",
                 distance=1.7,
                 yaw=90.0 - math.copysign(32.0, y),
