@@ -19,8 +19,13 @@ HOLD = 1  # s that the last picture of a clip stays
 _SAMPLES = 16  # pictures that a GIF's colours are chosen from
 
 
-def require_writable(path: Path) -> None:
+def require_writable(path: Path, width: int, height: int) -> None:
     """Refuse a file of a kind that cannot be written here, before any work is done.
+
+    Args:
+        path: of the file.
+        width: of each picture, in pixels.
+        height: of each picture, in pixels.
 
     Raises:
         UsageError: naming the kinds, or the library that is missing.
@@ -28,6 +33,8 @@ def require_writable(path: Path) -> None:
     if path.suffix not in (*STILLS, *CLIPS):
         raise UsageError(f"--out must end in .gif, .mp4 or .png, got {path.name}")
     if path.suffix == ".mp4":
+        if width % 2 or height % 2:
+            raise UsageError(f"an .mp4 needs an even width and height, got {width} × {height}")
         try:
             import av  # noqa: F401
         except ImportError as error:
@@ -54,7 +61,7 @@ def write(path: Path, kind: str, pictures: Iterator[Picture], rate: int) -> None
         Image.fromarray(mosaic(list(pictures), PER_ROW)).save(path, format="PNG", optimize=True)
 
 
-def mosaic(pictures: Sequence[Picture], columns: int) -> Picture:
+def mosaic(pictures: Sequence[Picture], columns: int) -> UInt8[np.ndarray, "tall wide 3"]:
     """Pictures in rows, from the top left; places left over are white."""
     height, width, _ = pictures[0].shape
     rows = -(-len(pictures) // columns)

@@ -48,11 +48,11 @@ def render(
     from workers.pictures import Size
 
     robot = setup_of(setup)
-    require_writable(out)
     try:
         size = Size(width, height)
     except ValueError as error:
         raise UsageError(f"{error}; change --width or --height") from error
+    require_writable(out, width, height)
     pace = usual_speed(robot) if speed is None else speed
     episode = exhibit(x, robot, seed)
     if out.suffix in STILLS:

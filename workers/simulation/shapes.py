@@ -90,7 +90,8 @@ def flat(left: float, right: float, near: float, far: float, height: float) -> Q
 def numbers(model: Ground, y: Interval, colour: Point) -> list[Surface]:
     """Every whole metre of y, written on the ground to be read by one who looks along +y."""
     metres = range(math.ceil(y[0]), math.floor(y[1]) + 1)
-    quads = [quad for x in model.numbered for metre in metres for quad in _written(str(metre), x, metre)]
+    places = [(metre, x) for metre in metres for x in model.numbered]
+    quads = [quad for metre, x in places for quad in _written(str(metre), x, float(metre))]
     return [Surface(colour, tuple(quads))] if quads else []
 
 
