@@ -28,7 +28,7 @@ from workers.simulation.stage import Stage
 
 REACH = 32  # tiles of the ground drawn around every point the camera looks at
 CALM = 1.0  # s, over which a camera that follows takes the mean of the positions
-_WOOD = ((0.86, 0.66, 0.38), (0.62, 0.43, 0.22))
+_WOOD = ((0.86, 0.66, 0.38), (0.72, 0.52, 0.28))
 _TILES = ((0.93, 0.93, 0.90), (0.80, 0.82, 0.82), (0.66, 0.69, 0.71), (0.60, 0.63, 0.66))
 _INK = (0.15, 0.2, 0.3)
 _UPRIGHT = [0.0, 0.0, 0.0, 1.0]

@@ -81,9 +81,9 @@ class TabletopModel:
             bodies=(arm, *rolls),
             ground=Ground(0.1, *self.table, numbered=()),
             camera=Camera(
-                target=(x, 0.0, 0.22),
+                target=(x, 0.0, 0.27),
                 follows="",
-                distance=1.7,
+                distance=1.85,
                 yaw=90.0 - math.copysign(32.0, y),
                 pitch=-33.0,
                 angle=38.0,

@@ -23,8 +23,8 @@ _LIGHT = {
     "lightColor": (1.0, 1.0, 1.0),
     "lightDistance": 7.0,
     "shadow": 1,
-    "lightAmbientCoeff": 0.4,
-    "lightDiffuseCoeff": 0.65,
+    "lightAmbientCoeff": 0.45,
+    "lightDiffuseCoeff": 0.6,
     "lightSpecularCoeff": 0.05,
 }
 _SKY = np.array([[196, 212, 228], [240, 244, 247]])  # red, green, blue at the top and the bottom
