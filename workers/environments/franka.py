@@ -43,6 +43,7 @@ MODEL = TabletopModel(
     cylinders=tuple(CylinderModel(radius=0.08, height=0.22, start=start, nominal=ROLL) for start in STARTS),
     control_step=CONTROL_STEP,
     solver_iterations=10,
+    table=(TABLE_X, TABLE_Y),
 )
 
 WAYPOINTS = WaypointRanges(

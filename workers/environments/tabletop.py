@@ -1,8 +1,10 @@
 """An arm in front of a table with tall cylinders on it: the scene of the stable push."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from struct import Struct
 
 import numpy as np
@@ -13,6 +15,7 @@ from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics, PhysicsRanges, around
 from workers.simulation.arm import Arm, ArmModel
 from workers.simulation.cylinder import Cylinder
+from workers.simulation.scenery import Camera, Ground, Interval, Machine, Roll, Scenery
 from workers.simulation.world import World
 
 
@@ -36,6 +39,7 @@ class TabletopModel:
         cylinders: the objects to push.
         control_step: seconds, also the step of the simulation.
         solver_iterations: of the contact solver in each step.
+        table: extent along x and y of the task's part of the plane, in m; pictures show it.
     """
 
     arm: ArmModel
@@ -43,6 +47,7 @@ class TabletopModel:
     cylinders: tuple[CylinderModel, ...]
     control_step: float
     solver_iterations: int
+    table: tuple[Interval, Interval]
 
     def nominal_physics(self) -> dict[str, float]:
         """Nominal values of all randomised parameters: `object1_mass` (kg) and so on."""
@@ -79,6 +84,24 @@ class TabletopModel:
         limits = zip(self.arm.joints, self.drive.limits, strict=True)
         return tuple(Channel(name, self.drive.unit, -limit, limit) for name, limit in limits)
 
+    def scenery(self) -> Scenery:
+        """The arm, its objects and the table, from above the side that they are pushed to."""
+        arm = Machine(Path(self.arm.urdf), self.arm.joints, (0.0, 0.0, 0.0))
+        rolls = (Roll(c.radius, c.height, f"object{n}") for n, c in enumerate(self.cylinders, 1))
+        x, y = (float(mean) for mean in np.mean([c.start for c in self.cylinders], axis=0))
+        return Scenery(
+            bodies=(arm, *rolls),
+            ground=Ground(0.1, *self.table, numbered=()),
+            camera=Camera(
+                target=(x, 0.0, 0.27),
+                follows="",
+                distance=1.85,
+                yaw=90.0 - math.copysign(32.0, y),
+                pitch=-33.0,
+                angle=38.0,
+            ),
+        )
+
 
 def _object_channels(name: str) -> list[Channel]:
     positions = [Channel(f"{name}_{axis}", "m", -3.0, 3.0) for axis in "xyz"]
@@ -103,6 +126,7 @@ class Tabletop(Environment):
         self.observation = model.observation()
         self.action = model.action()
         self.control_step = model.control_step
+        self.scenery = model.scenery()
         self._model = model
         self._build()
 
