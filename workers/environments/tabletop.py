@@ -86,7 +86,7 @@ class TabletopModel:
 
     def scenery(self) -> Scenery:
         """The arm, its objects and the table, from above the side that they are pushed to."""
-        arm = Machine(Path(self.arm.urdf), self.arm.joints, (0.0, 0.0, 0.0))
+        arm = Machine(Path(self.arm.urdf), self.arm.joints, self.arm.base)
         rolls = (Roll(c.radius, c.height, f"object{n}") for n, c in enumerate(self.cylinders, 1))
         x, y = (float(mean) for mean in np.mean([c.start for c in self.cylinders], axis=0))
         return Scenery(

@@ -56,6 +56,7 @@ def setup_at(name: str, share: float) -> Setup:
         cylinders=tuple(CylinderModel(radius=0.05, height=0.22, start=at, nominal=ROLL) for at in STARTS),
         control_step=CONTROL_STEP,
         solver_iterations=50,
+        table=(TABLE_X, TABLE_Y),
     )
     task = StablePush(
         starts=STARTS, direction=1.0, table_x=TABLE_X, table_y=TABLE_Y, margin=MARGIN, channel=len(ARM.joints)
