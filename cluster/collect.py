@@ -21,6 +21,7 @@ from workers.collection import ShardReport
 from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
+from workers.dataset.inventory import sweep_digests
 from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
 from workers.setups import Setup
@@ -109,6 +110,7 @@ def _clean(dataset: Dataset, writers: list[str]) -> None:
     """Leave no unfinished file behind, however the work ended."""
     wait_for_end(writers, _ENDING_SECONDS)
     shards.sweep(dataset.folder)
+    sweep_digests(dataset)
 
 
 def _gather(
