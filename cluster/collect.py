@@ -20,7 +20,7 @@ from cluster.tracking import Run, Tracker
 from workers.collection import ShardReport
 from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
-from workers.dataset.identity import identity_of
+from workers.dataset.identity import Identity, identity_of
 from workers.dataset.inventory import sweep_digests
 from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
@@ -43,6 +43,7 @@ def collect(
     episodes: int,
     folder: Path,
     seed: int,
+    repeats: int = 1,
     settings: CollectSettings,
     session: Session,
     tracker: Tracker,
@@ -52,7 +53,8 @@ def collect(
     Raises:
         UserError: the folder holds another dataset, the disk is full, or shards kept failing.
     """
-    dataset, plan = _plan(setup, episodes, folder, seed, settings.episodes_per_shard)
+    identity = identity_of(setup, seed=seed, episodes_per_shard=settings.episodes_per_shard, repeats=repeats)
+    dataset, plan = _plan(identity, episodes, folder)
     if not plan:
         say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
         return dataset
@@ -62,6 +64,7 @@ def collect(
         "setup": setup.name,
         "episodes": episodes,
         "seed": seed,
+        "repeats": repeats,
         "actors": actors,
         "identity": dataset.identity.digest[:12],
         **settings.model_dump(mode="json"),
@@ -78,11 +81,9 @@ def collect(
     return dataset
 
 
-def _plan(
-    setup: Setup, episodes: int, folder: Path, seed: int, per_shard: int
-) -> tuple[Dataset, list[Shard]]:
+def _plan(identity: Identity, episodes: int, folder: Path) -> tuple[Dataset, list[Shard]]:
     try:
-        dataset = create(folder, identity_of(setup, seed=seed, episodes_per_shard=per_shard))
+        dataset = create(folder, identity)
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     swept = shards.sweep(folder)

@@ -44,9 +44,10 @@ class ShardReport:
 
 def roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
     """The episodes of a shard, in a fresh simulation."""
+    seed, repeats = dataset.identity.seed, dataset.identity.repeats
     with setup.open() as environment:
         return [
-            random_episode(setup, environment, dataset.identity.seed, index)
+            random_episode(setup, environment, seed, index, repeats)
             for index in range(shard.start, shard.stop)
         ]
 
@@ -94,7 +95,9 @@ def require_same_code(setup: Setup, dataset: Dataset) -> None:
         ValueError: naming this machine, and what differs in its code or libraries.
     """
     asked = dataset.identity
-    own = identity_of(setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard)
+    own = identity_of(
+        setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard, repeats=asked.repeats
+    )
     differences = asked.differences(own)
     if differences:
         raise ValueError(

@@ -5,17 +5,18 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cluster.collect import _note_failure, _pool, collect
 from cluster.config import CollectSettings
+from cluster.dataset_commands import info
 from cluster.errors import UserError
 from cluster.pool import Failed
 from cluster.quarantine import put_aside, quarantined, release
@@ -26,7 +27,7 @@ from workers import setups
 from workers.collection import collect_shard
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.publication import WRITING
+from workers.dataset.publication import WRITING, host
 from workers.dataset.shards import Shard, digest_path
 from workers.dataset.verification import verify
 
@@ -80,6 +81,21 @@ def test_a_cluster_collects_the_bytes_that_one_process_would(ray_session, tracki
     assert not [problem for _, problems in verify(dataset) for problem in problems]
     assert dataset.fingerprint() == alone(tmp_path / "alone", 20).fingerprint()
     assert not list((tmp_path / "cluster" / WRITING).iterdir())
+
+
+def test_repeats_are_collected_by_any_worker_and_described(tmp_path, capsys):
+    identity = identity_of(setups.load("franka"), seed=3, episodes_per_shard=8, repeats=3)
+    dataset = create(tmp_path, identity)
+    worker = RolloutActor("franka", str(tmp_path))
+    for shard in dataset.missing(12):
+        worker.collect(shard)
+    assert not [problem for _, problems in verify(dataset) for problem in problems]
+    controllers = np.concatenate([columns.x for _, columns in dataset.batches()])
+    assert len(np.unique(controllers, axis=0)) == 4
+    info(tmp_path)
+    described = capsys.readouterr().out
+    assert "3 of each controller" in described
+    assert "of the variance of y" in described
 
 
 def test_extending_rewrites_nothing_and_asking_again_does_nothing(
@@ -217,7 +233,7 @@ def test_a_machine_with_other_libraries_collects_nothing_and_names_them(tmp_path
     identity = identity_of(setups.load("franka"), seed=0, episodes_per_shard=8)
     dataset = create(tmp_path / "dataset", replace(identity, numpy="1.0", pybullet="2.0"))
     differ = (
-        rf"{socket.gethostname()} would roll out other episodes .* differ in pybullet: 2\.0 and .*numpy: 1\.0"
+        rf"{host()} would roll out other episodes .* differ in pybullet: 2\.0 and .*numpy: 1\.0"
     )
     with pytest.raises(ValueError, match=differ):
         RolloutActor("franka", str(dataset.folder))
