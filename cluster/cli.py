@@ -81,6 +81,9 @@ def collect(
     setup: SetupName,
     dataset: DatasetFolder,
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many the dataset shall hold.")],
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
+    ] = 1,
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -100,6 +103,7 @@ def collect(
             episodes=episodes,
             folder=dataset,
             seed=seed,
+            repeats=repeats,
             settings=settings.collect,
             session=session,
             tracker=tracker,

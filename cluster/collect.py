@@ -20,7 +20,8 @@ from cluster.tracking import Run, Tracker
 from workers.collection import ShardReport
 from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
-from workers.dataset.identity import identity_of
+from workers.dataset.identity import Identity, identity_of
+from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
 from workers.setups import Setup
 
@@ -28,6 +29,9 @@ _DISK = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
     *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
 }
+
+_ENDING_SECONDS = 10.0
+"""What a worker process may take to end once it was told to."""
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
@@ -38,6 +42,7 @@ def collect(
     episodes: int,
     folder: Path,
     seed: int,
+    repeats: int = 1,
     settings: CollectSettings,
     session: Session,
     tracker: Tracker,
@@ -47,7 +52,8 @@ def collect(
     Raises:
         UserError: the folder holds another dataset, the disk is full, or shards kept failing.
     """
-    dataset, plan = _plan(setup, episodes, folder, seed, settings.episodes_per_shard)
+    identity = identity_of(setup, seed=seed, episodes_per_shard=settings.episodes_per_shard, repeats=repeats)
+    dataset, plan = _plan(identity, episodes, folder)
     if not plan:
         say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
         return dataset
@@ -57,23 +63,26 @@ def collect(
         "setup": setup.name,
         "episodes": episodes,
         "seed": seed,
+        "repeats": repeats,
         "actors": actors,
         "identity": dataset.identity.digest[:12],
         **settings.model_dump(mode="json"),
     }
     with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
         tally = Tally()
-        with _pool(dataset, settings, actors) as pool:
-            _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+        pool = _pool(dataset, settings, actors)
+        try:
+            with pool:
+                _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+        finally:
+            _clean(dataset, pool.answers)
         _record(dataset, episodes, tally, run)
     return dataset
 
 
-def _plan(
-    setup: Setup, episodes: int, folder: Path, seed: int, per_shard: int
-) -> tuple[Dataset, list[Shard]]:
+def _plan(identity: Identity, episodes: int, folder: Path) -> tuple[Dataset, list[Shard]]:
     try:
-        dataset = create(folder, identity_of(setup, seed=seed, episodes_per_shard=per_shard))
+        dataset = create(folder, identity)
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     swept = shards.sweep(folder)
@@ -95,6 +104,12 @@ def _pool(dataset: Dataset, settings: CollectSettings, actors: int) -> Pool[Shar
             seconds=settings.shard_timeout_seconds,
         ),
     )
+
+
+def _clean(dataset: Dataset, writers: list[str]) -> None:
+    """Leave no unfinished file behind, however the work ended."""
+    wait_for_end(writers, _ENDING_SECONDS)
+    shards.sweep(dataset.folder)
 
 
 def _gather(
@@ -135,7 +150,6 @@ def _unwritable(dataset: Dataset, error: OSError) -> UserError:
 
 def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
     """Say first how it went: the store may fail."""
-    shards.sweep(dataset.folder)
     release(dataset)
     metrics = tally.metrics()
     say(

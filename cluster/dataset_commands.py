@@ -11,6 +11,7 @@ from cluster.errors import UserError
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 from workers.dataset.verification import gaps, verify
 
@@ -41,6 +42,7 @@ def info(folder: Folder) -> None:
         "observation": f"{len(identity.observation)} channels",
         "controller": f"{len(identity.parameters)} parameters",
         "seed": str(identity.seed),
+        "repeats": f"{identity.repeats} of each controller",
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
         "made with": f"pybullet {identity.pybullet}, numpy {identity.numpy}",
@@ -48,6 +50,7 @@ def info(folder: Folder) -> None:
     }
     try:
         rows |= _described(statistics(dataset)) if episodes else {}
+        rows |= _irreducible(dataset) if identity.repeats > 1 else {}
     except ValueError as error:
         raise UserError(
             f"{error}; `svaedc dataset verify {folder}` lists everything that is wrong"
@@ -64,6 +67,18 @@ def _described(found: Statistics) -> dict[str, str]:
         "badness": f"{found.badness:.3f} on average",
         "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
         "diverged": str(found.diverged),
+    }
+
+
+def _irreducible(dataset: Dataset) -> dict[str, str]:
+    """What the controller does not decide."""
+    found = irreducible(dataset)
+    if found is None:
+        return {"irreducible": "unknown: fewer than two controllers have all their repeats"}
+    low, high = found.xi
+    return {
+        "irreducible": f"{found.y:.2f} of the variance of y, {found.f:.2f} of that of f "
+        f"({found.controllers} controllers); of xi, {low:.2f} to {high:.2f} of the error of its median"
     }
 
 

@@ -42,9 +42,10 @@ def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:
         OSError: when the disk is full or not writable; nothing is left behind.
     """
     begin = time.process_time()
+    seed, repeats = dataset.identity.seed, dataset.identity.repeats
     with setup.open() as environment:
         episodes = [
-            random_episode(setup, environment, dataset.identity.seed, index)
+            random_episode(setup, environment, seed, index, repeats)
             for index in range(shard.start, shard.stop)
         ]
     rolled_out = time.process_time()

@@ -70,9 +70,19 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     return _episode(setup, environment.observed(records), controller, physics)
 
 
-def random_episode(setup: Setup, environment: Environment, seed: int, index: int) -> Episode:
-    """Episode `index` of the dataset with that seed: its controller and physics depend on nothing else."""
-    x = generator(seed, "controller", index).random(setup.dimensions, dtype=np.float32)
+def random_episode(
+    setup: Setup, environment: Environment, seed: int, index: int, repeats: int = 1
+) -> Episode:
+    """Episode `index` of a dataset with that seed: its controller and physics depend on nothing else.
+
+    Args:
+        setup: robot, controller and task.
+        environment: the setup's, open.
+        seed: of the dataset.
+        index: of the episode.
+        repeats: how many consecutive episodes share a controller; each has physics of its own.
+    """
+    x = generator(seed, "controller", index // repeats).random(setup.dimensions, dtype=np.float32)
     return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
 
 

@@ -12,10 +12,12 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cluster.collect import _note_failure, _pool, collect
 from cluster.config import CollectSettings
+from cluster.dataset_commands import info
 from cluster.errors import UserError
 from cluster.pool import Failed
 from cluster.quarantine import put_aside, quarantined, release
@@ -63,7 +65,7 @@ def command(folder: Path, store: Path, episodes: int) -> list[str]:
 
 
 def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while len(list(folder.glob("*.parquet"))) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
@@ -80,6 +82,21 @@ def test_a_cluster_collects_the_bytes_that_one_process_would(ray_session, tracki
     assert not [problem for _, problems in verify(dataset) for problem in problems]
     assert dataset.fingerprint() == alone(tmp_path / "alone", 20).fingerprint()
     assert not list((tmp_path / "cluster" / WRITING).iterdir())
+
+
+def test_repeats_are_collected_by_any_worker_and_described(tmp_path, capsys):
+    identity = identity_of(setups.load("franka"), seed=3, episodes_per_shard=8, repeats=3)
+    dataset = create(tmp_path, identity)
+    worker = RolloutActor("franka", str(tmp_path))
+    for shard in dataset.missing(12):
+        worker.collect(shard)
+    assert not [problem for _, problems in verify(dataset) for problem in problems]
+    controllers = np.concatenate([columns.x for _, columns in dataset.batches()])
+    assert len(np.unique(controllers, axis=0)) == 4
+    info(tmp_path)
+    described = capsys.readouterr().out
+    assert "3 of each controller" in described
+    assert "of the variance of y" in described
 
 
 def test_extending_rewrites_nothing_and_asking_again_does_nothing(
@@ -138,7 +155,7 @@ def test_ctrl_c_ends_cleanly_and_says_how_to_go_on(tmp_path):
     ) as process:
         wait_for_shards(folder, 1, process)
         process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=60)
+        output, _ = process.communicate(timeout=180)
     assert process.returncode == 130, output
     assert "the same command goes on" in output
     assert "Traceback" not in output

@@ -163,7 +163,7 @@ def test_episodes_are_bit_identical_in_a_fresh_process(setup, episodes):
         "print(json.dumps(digests))\n"
     )
     command = [sys.executable, "-c", script, setup.name, str(setup.horizon)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     expected = [
         hashlib.sha256(episodes[index].xi.tobytes() + episodes[index].bad.tobytes()).hexdigest()
         for index in (4, 1)

@@ -80,7 +80,8 @@ def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
         yield "it holds numbers that are not finite"
     if not np.allclose(columns.y, (columns.bad != 0).mean(axis=1), atol=1e-6):
         yield "y is not the mean of the bad steps"
-    controllers = (generator(identity.seed, "controller", int(index)) for index in columns.episode)
+    drawn = columns.episode // identity.repeats
+    controllers = (generator(identity.seed, "controller", int(index)) for index in drawn)
     width = columns.x.shape[1]
     if not all(
         np.array_equal(x, rng.random(width, dtype=np.float32))

@@ -39,7 +39,7 @@ def episodes_of():
         rng = generator(identity.seed, "toy", index)
         bad = rng.integers(0, 4, identity.horizon).astype(np.uint8)
         return Episode(
-            x=generator(identity.seed, "controller", index).random(2, dtype=np.float32),
+            x=generator(identity.seed, "controller", index // identity.repeats).random(2, dtype=np.float32),
             xi=rng.uniform(-1, 1, (3, identity.horizon)).astype(np.float32),
             bad=bad,
             y=float((bad != 0).mean()),
