@@ -8,14 +8,19 @@ import pybullet
 import pytest
 
 from workers import setups
-from workers.pictures import Show, Size, frames, pose_of
+from workers.pictures import Show, Size, frames, pose_of, scenery_of
 from workers.rollout import random_episode
 from workers.simulation.stage import Stage
 
 STEPS = 120  # long enough for an arm to reach its objects and for a walker to leave its start
 
 
-@pytest.fixture(scope="module", params=sorted(setups.MODULES))
+def _visible() -> list[str]:
+    """All but the setups that are formulas: a robot that lacks scenery must fail here."""
+    return sorted(name for name in setups.MODULES if not name.startswith("quadratic"))
+
+
+@pytest.fixture(scope="module", params=_visible())
 def setup(request):
     whole = setups.load(request.param)
     return replace(whole, horizon=min(whole.horizon, STEPS))
@@ -121,6 +126,16 @@ def test_an_inexact_rotation_is_made_exact():
     assert position.tolist() == [1.0, 2.0, 3.0]
     # x onto y and y onto -x is a quarter turn about z.
     assert np.allclose(np.abs(orientation), [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+
+
+def test_an_environment_without_scenery_is_refused(setup):
+    def bare():
+        environment = setup.open()
+        environment.scenery = None
+        return environment
+
+    with pytest.raises(LookupError, match=f"{setup.name} has nothing to see"):
+        scenery_of(replace(setup, build=bare))
 
 
 def test_a_size_that_cannot_be_drawn_is_refused():
