@@ -118,7 +118,7 @@ def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
         f"{tally.episodes} new in {duration(tally.seconds)} "
         f"({tally.episodes / max(tally.seconds, 1e-9):.1f}/s, {tally.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {tally.bad / max(tally.episodes, 1):.2f}, {tally.diverged} diverged, "
-        f"{tally.retries} retries; {run.url}"
+        f"{tally.stopped} stopped, {tally.retries} retries; {run.url}"
     )
     run.metrics(tally.metrics() | review(dataset), step=tally.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)

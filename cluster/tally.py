@@ -22,6 +22,7 @@ class Tally:
     episodes: int = 0
     size: int = 0
     diverged: int = 0
+    stopped: int = 0
     bad: float = 0.0  # summed over episodes
     best: float = float("-inf")
     rollout_seconds: float = 0.0
@@ -37,6 +38,7 @@ class Tally:
         self.episodes += report.shard.episodes
         self.size += report.size
         self.diverged += report.diverged
+        self.stopped += report.stopped
         self.bad += report.badness * report.shard.episodes
         self.best = max(self.best, report.best)
         self.rollout_seconds += report.rollout_seconds
@@ -67,6 +69,7 @@ class Tally:
             "badness": self.bad / max(self.episodes, 1),
             "best_objective": self.best,
             "diverged": self.diverged,
+            "stopped": self.stopped,
             "bytes_per_episode": self.size / max(self.episodes, 1),
             "core_hours": self.core_seconds / 3600,
             "storage_share": self.storage_seconds / max(self.core_seconds, 1e-9),

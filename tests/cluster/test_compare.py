@@ -30,7 +30,8 @@ from svaedc.comparison import Trial
 from svaedc.methods import names
 from svaedc.model import SvaeDc
 from svaedc.presets import Sizes, compact
-from svaedc.statistics import Reporting, Row, summarise
+from svaedc.statistics import summarise
+from svaedc.summaries import Reporting, Row
 from workers import setups
 
 SETTINGS = CompareSettings(slots=2, pool_size=200)
