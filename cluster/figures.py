@@ -31,6 +31,7 @@ _STYLES = {
     "screened-svae": ("#aa4499", "<", "-"),
     "svae-dc": ("#d55e00", "*", "-"),
     "svae-dc-whitened": ("#009e73", "P", "-"),
+    "svae-dc-online": ("#117733", "8", "-"),
     "svae-dc-sigmoid": ("#a6761d", "p", "-"),
     "svae-matern": ("#cc79a7", ">", "-."),
     "svae-dc-matern": ("#d55e00", "h", "-."),
