@@ -23,6 +23,7 @@ from cluster.options import (
     interruptible,
     settings_of,
     setup_of,
+    usage_errors,
 )
 from cluster.progress import say
 
@@ -38,7 +39,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
-    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`. "
+    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
+    "`render` shows an episode. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
@@ -81,25 +83,35 @@ def collect(
     setup: SetupName,
     dataset: DatasetFolder,
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many the dataset shall hold.")],
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
+    ] = 1,
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
     address: Address = None,
+    *,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Collect a few shards, and say what all of it will cost.")
+    ] = False,
 ) -> None:
     """Roll out random controllers on a pool of Ray actors into Parquet shards.
 
     What the folder holds already is kept: run the same command again after an interruption, or ask for more
-    episodes to extend the dataset.
+    episodes to extend the dataset. With --plan, only the first shards are collected, and what all of them
+    will cost is told from those.
     """
     from cluster.collect import collect as run_collect
+    from cluster.collect import foretell
 
     settings, chosen = settings_of(config, overrides), setup_of(setup)
     with _services(settings, address) as (session, tracker):
-        run_collect(
+        (foretell if plan else run_collect)(
             setup=chosen,
             episodes=episodes,
             folder=dataset,
             seed=seed,
+            repeats=repeats,
             settings=settings.collect,
             session=session,
             tracker=tracker,
@@ -145,7 +157,9 @@ def compare(
     trials: Annotated[
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
     ] = 20,
-    gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
+    gap: Annotated[
+        str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
+    ] = "paper",
     model: TrainedModel = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
@@ -155,17 +169,21 @@ def compare(
     """Run methods of Bayesian optimisation side by side in simulation, in parallel on Ray Tune.
 
     All methods of a seed share their random trials and the hidden physics. Report seeds below 1000; tune with
-    --seed 1000 and above. Writes trials.parquet, summary.json, figure.png and figure.svg.
+    --seed 1000 and above. Writes trials.parquet, summary.json, report.html, figure.png and figure.svg.
     """
-    from cluster.compare import Grid
     from cluster.compare import compare as run_compare
+    from cluster.grid import Grid
 
     settings, chosen = settings_of(config, overrides), setup_of(setup)
     names = tuple(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
+    grid = Grid(names, seed, runs)
+    grid.require(model)
+    with usage_errors():
+        chosen.gap(gap)
     with _services(settings, address) as (session, tracker):
         run_compare(
             setup=chosen,
-            grid=Grid(names, seed, runs),
+            grid=grid,
             trials=trials,
             gap=gap,
             model=model,
@@ -191,7 +209,9 @@ def ui(
 def _add_groups() -> None:
     from cluster.dataset_commands import app as dataset_app
     from cluster.hardware.commands import app as hardware_app
+    from cluster.render_command import render
 
+    app.command()(render)
     app.add_typer(dataset_app, name="dataset")
     app.add_typer(hardware_app, name="hardware")
 

@@ -14,8 +14,10 @@ from ray import tune
 
 from cluster.results import RunKey, append, recorded
 from svaedc import checkpoint, methods
+from svaedc.adjustment import Adjustable
 from svaedc.candidates import Problem
 from svaedc.comparison import Outcome, Trial, trials
+from svaedc.densities import Densities
 from svaedc.features import Latents
 from svaedc.model import SvaeDc
 from workers import setups
@@ -34,7 +36,7 @@ class ComparisonJob:
     Attributes:
         folder: of the results.
         setup: its name.
-        gap: level of the hidden physics.
+        gap: level of the hidden physics, or its ranges written out.
         model: checkpoint; "" when no method needs one.
         pool_size: candidates of each run.
         initial: random trials that all methods of a seed share.
@@ -73,10 +75,13 @@ class ComparisonJob:
 
     def _problem(self, key: RunKey, setup: Setup) -> Problem:
         pool = generator(key.run, "pool", 0).random((self.pool_size, setup.dimensions), dtype=np.float32)
-        latents = None
-        if methods.needs_model(key.method):
-            latents = Latents.of(torch.from_numpy(pool), _model(self.model).latent_means)
-        return Problem(setup.dimensions, setup.objective_limits, pool, latents)
+        if not methods.needs_model(key.method):
+            return Problem(setup.dimensions, setup.objective_limits, pool)
+        model = _model(self.model)
+        latents = Latents.of(torch.from_numpy(pool), model.latent_means)
+        return Problem(
+            setup.dimensions, setup.objective_limits, pool, latents, Densities.of(model), Adjustable(model)
+        )
 
 
 def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:

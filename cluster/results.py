@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from cluster.errors import UserError
 from cluster.files import replacing
 from svaedc.comparison import Trial
-from svaedc.statistics import Row
+from svaedc.summaries import Row
 
 RUNS = "runs"
 TABLE = "trials.parquet"
@@ -94,6 +94,11 @@ def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
     for path in sorted((folder / RUNS).glob("*.jsonl")):
         method, _, run = path.stem.rpartition("-")
         yield RunKey(method, int(run)), recorded(path)
+
+
+def seeds_in(folder: Path) -> set[int]:
+    """Of all runs that have begun."""
+    return {int(path.stem.rpartition("-")[2]) for path in (folder / RUNS).glob("*.jsonl")}
 
 
 def rows(runs: Runs) -> list[Row]:

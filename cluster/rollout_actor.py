@@ -1,12 +1,11 @@
 """The rollout process, in a module of its own so that it loads nothing that only the driver needs."""
 
-import socket
 from pathlib import Path
 
 from workers import setups
-from workers.collection import ShardReport, collect_shard
+from workers.collection import ShardReport, collect_shard, require_same_code
 from workers.dataset.folder import open_dataset
-from workers.dataset.identity import identity_of
+from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
 
 
@@ -16,23 +15,12 @@ class RolloutActor:
     def __init__(self, setup: str, folder: str) -> None:
         self._setup = setups.load(setup)
         self._dataset = open_dataset(Path(folder))
-        self._require_same_code()
+        require_same_code(self._setup, self._dataset)
 
-    def ready(self) -> None:
-        """Answers once the process has started and found its dataset."""
+    def ready(self) -> str:
+        """The name under which this process writes files, once it has started and found its dataset."""
+        return writer()
 
     def collect(self, shard: Shard) -> ShardReport:
         """One shard, from its first episode to its name in the dataset."""
         return collect_shard(self._setup, self._dataset, shard)
-
-    def _require_same_code(self) -> None:
-        """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""
-        asked = self._dataset.identity
-        own = identity_of(self._setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard)
-        differences = asked.differences(own)
-        if differences:
-            raise ValueError(
-                f"the machine {socket.gethostname()} would roll out other episodes than "
-                f"{self._dataset.folder} holds; the two differ in {'; '.join(differences)}. "
-                "Install the same svaedc and libraries on every machine"
-            )

@@ -106,7 +106,7 @@ class TrainingJob:
 def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
     """Training and held-out episodes of a cache."""
     rows = np.arange(len(cache.episode))
-    return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.episode)
+    return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.controller())
 
 
 def bounds(dataset: Path) -> tuple[list[float], list[float]]:

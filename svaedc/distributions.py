@@ -36,6 +36,10 @@ class Diagonal(ABC):
         """One reparameterised draw of each element from torch's current random generator."""
         return self.loc + self.scale * self._standard_noise()
 
+    def quantile(self, u: Float[Tensor, "*event"]) -> Float[Tensor, "batch *event"]:
+        """Value below which each element lies with its probability u in (0, 1), the same u for every row."""
+        return self.loc + self.scale * self._standard_quantile(u)
+
     @property
     @abstractmethod
     def variance(self) -> Float[Tensor, "batch *event"]:
@@ -57,6 +61,10 @@ class Diagonal(ABC):
     @abstractmethod
     def _standard_noise(self) -> Tensor:
         """Draw from the standard distribution, shaped like `loc`."""
+
+    @abstractmethod
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        """Quantile of the standard distribution."""
 
     @abstractmethod
     def _kl_elements(self, p: "Diagonal") -> Tensor:
@@ -85,6 +93,9 @@ class DiagonalLaplace(Diagonal):
         u = torch.empty_like(self.loc).uniform_(torch.finfo(self.loc.dtype).eps - 1.0, 1.0)
         return -u.sign() * torch.log1p(-u.abs())
 
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        return -(u - 0.5).sign() * torch.log1p(-2.0 * (u - 0.5).abs())
+
     def _kl_elements(self, p: "Diagonal") -> Tensor:
         distance = (self.loc - p.loc).abs()
         ratio = self.scale / p.scale
@@ -110,6 +121,9 @@ class DiagonalGaussian(Diagonal):
 
     def _standard_noise(self) -> Tensor:
         return torch.randn_like(self.loc)
+
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        return torch.special.ndtri(u)
 
     def _kl_elements(self, p: "Diagonal") -> Tensor:
         ratio = self.scale / p.scale

@@ -103,19 +103,20 @@ def measured_over(
     return results
 
 
-def split(episodes: Episodes, episode: Integer[np.ndarray, " episodes"]) -> tuple[Episodes, Episodes]:
-    """Training and held-out episodes: one in ten, those whose number ends in 9, is held out.
+def split(episodes: Episodes, controller: Integer[np.ndarray, " episodes"]) -> tuple[Episodes, Episodes]:
+    """Training and held-out episodes: those of every controller whose number ends in 9 are held out.
 
     Args:
         episodes: The selection to split.
-        episode: The dataset-wide number of each, so that extending a dataset moves no episode across.
+        controller: The dataset-wide number of each one's x, so that no controller is on both sides, and
+            extending a dataset moves no episode across.
 
     Raises:
         ValueError: The numbers do not fit the selection.
     """
-    if len(episode) != len(episodes):
-        raise ValueError(f"{len(episodes)} episodes need as many numbers, got {len(episode)}")
-    is_held_out = episode % 10 == 9
+    if len(controller) != len(episodes):
+        raise ValueError(f"{len(episodes)} episodes need as many numbers, got {len(controller)}")
+    is_held_out = controller % 10 == 9
     return (
         replace(episodes, rows=episodes.rows[~is_held_out]),
         replace(episodes, rows=episodes.rows[is_held_out]),

@@ -11,15 +11,17 @@ Example:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
-from workers.controllers.controller import unit_cube
+from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
+from workers.tasks.stop import STOPPED, never
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -37,8 +39,13 @@ class Episode:
         bad: per step, one bit for each bad condition.
         y: badness, the fraction of bad steps, in [0, 1].
         f: the objective.
-        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded.
+        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded, or
+            the reason of the setup's stop rule. From there on ξ repeats the last state.
         physics: the parameters it ran under.
+
+    A diverged episode is bad throughout, and no model may learn from it. A stopped one is a fact about its
+    controller, and may be learnt from: the step that gave the reason and all that were not run are bad as
+    `stopped`; those before have the conditions that were seen, and f is the task's `stopped_objective`.
     """
 
     x: Float32[np.ndarray, " d"]
@@ -65,42 +72,81 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     controller = unit_cube(x, setup.dimensions)
     environment.reset(physics)
     command = setup.controller.start(controller, environment, setup.horizon)
-    step = environment.step
-    records = [step(command(t)) for t in range(setup.horizon)]
-    return _episode(setup, environment.observed(records), controller, physics)
+    if setup.stop is never:
+        step = environment.step
+        records, reason = [step(command(t)) for t in range(setup.horizon)], ""
+    else:
+        records, reason = _guarded(setup, environment, command)
+    return _episode(setup, environment.observed(records), reason, controller, physics)
 
 
-def random_episode(setup: Setup, environment: Environment, seed: int, index: int) -> Episode:
-    """Episode `index` of the dataset with that seed: its controller and physics depend on nothing else."""
-    x = generator(seed, "controller", index).random(setup.dimensions, dtype=np.float32)
+def random_episode(
+    setup: Setup, environment: Environment, seed: int, index: int, repeats: int = 1
+) -> Episode:
+    """Episode `index` of a dataset with that seed: its controller and physics depend on nothing else.
+
+    Args:
+        setup: robot, controller and task.
+        environment: the setup's, open.
+        seed: of the dataset.
+        index: of the episode.
+        repeats: how many consecutive episodes share a controller; each has physics of its own.
+    """
+    x = generator(seed, "controller", index // repeats).random(setup.dimensions, dtype=np.float32)
     return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
 
 
-def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) -> Episode:
-    sane = sane_steps(observed.xi, setup.observation)
-    if sane < setup.horizon:
-        return _diverged(setup, observed, sane, x, physics)
+def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
+    """The records up to the step at which the setup's rule stops, that one included, and its reason."""
+    records = []
+    for t in range(setup.horizon):
+        records.append(environment.step(command(t)))
+        reason = setup.stop(environment.observed(records[-1:]))
+        if reason:
+            return records, reason
+    return records, ""
+
+
+def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:
+    sane, steps = sane_steps(observed.xi, setup.observation), observed.xi.shape[1]
+    if sane < steps:
+        return _diverged(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
+    objective = setup.task.stopped_objective if reason else setup.task.objective
+    bad = _stopped(_bits(is_bad), setup) if reason else _bits(is_bad)
     return Episode(
         x=x,
-        xi=observed.xi,
-        bad=_bits(is_bad),
-        y=float(is_bad.any(axis=0).mean()),
-        f=float(np.float32(setup.task.objective(observed, is_bad))),
-        stop="",
+        xi=_held(observed.xi, setup.horizon),
+        bad=bad,
+        y=float((bad != 0).mean()),
+        f=float(np.float32(objective(observed, is_bad))),
+        stop=reason,
         physics=physics,
     )
 
 
-def _diverged(setup: Setup, observed: Observed, sane: int, x: np.ndarray, physics: Physics) -> Episode:
+def _stopped(bad: UInt8[np.ndarray, " run"], setup: Setup) -> UInt8[np.ndarray, " time"]:
+    """The bits of all T steps: `stopped` from the last that was run, and nothing else where none was."""
+    whole = np.zeros(setup.horizon, dtype=np.uint8)
+    whole[: len(bad)] = bad
+    whole[len(bad) - 1 :] |= np.uint8(1 << setup.conditions.index(STOPPED))
+    return whole
+
+
+def _held(xi: Float32[np.ndarray, "obs run"], horizon: int) -> Float32[np.ndarray, "obs time"]:
+    """The trajectory with its last state repeated up to the horizon."""
+    missing = horizon - xi.shape[1]
+    return np.pad(xi, ((0, 0), (0, missing)), mode="edge") if missing else xi
+
+
+def _diverged(
+    setup: Setup, sane: Float32[np.ndarray, "obs sane"], x: np.ndarray, physics: Physics
+) -> Episode:
     """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
-    xi = observed.xi.copy()
-    if sane == 0:
-        xi[:] = np.array([(channel.low + channel.high) / 2 for channel in setup.observation])[:, None]
-    else:
-        xi[:, sane:] = xi[:, sane - 1 : sane]
+    if not sane.size:
+        sane = np.array([[(channel.low + channel.high) / 2] for channel in setup.observation], np.float32)
     bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
-    return Episode(x, xi, bad, 1.0, diverged_objective(setup), DIVERGED, physics)
+    return Episode(x, _held(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
 def diverged_objective(setup: Setup) -> float:

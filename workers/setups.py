@@ -7,7 +7,8 @@ from importlib import import_module
 
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
-from workers.physics import PhysicsRanges
+from workers.physics import PhysicsRanges, ranges
+from workers.tasks.stop import STOPPED, StopRule, never
 from workers.tasks.task import Task
 
 MODULES = {
@@ -15,6 +16,9 @@ MODULES = {
     "daisy-27d": "workers.environments.daisy_27d",
     "daisy-11d": "workers.environments.daisy_11d",
     "daisy-11d-rehearsal": "workers.environments.daisy_11d_rehearsal",
+    "franka-rehearsal": "workers.environments.franka_rehearsal",
+    "yumi": "workers.environments.yumi",
+    "yumi-rehearsal": "workers.environments.yumi_rehearsal",
 }
 """A new robot is one module that offers `setup()`, and one line here."""
 
@@ -35,6 +39,7 @@ class Setup:
         gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
         objective_limits: the range of f, fixed; BO scales f by it.
         success: an episode with f above this succeeded.
+        stop: ends an episode early; of stand-ins for hardware only.
     """
 
     name: str
@@ -48,6 +53,7 @@ class Setup:
     gaps: Mapping[str, PhysicsRanges]
     objective_limits: tuple[float, float]
     success: float
+    stop: StopRule = never
 
     @property
     def dimensions(self) -> int:
@@ -56,16 +62,29 @@ class Setup:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Names of the bad conditions, in the order of their bits."""
-        return self.task.conditions
+        """Names of the bad conditions, in the order of their bits; `stopped` comes last if it may be."""
+        return self.task.conditions if self.stop is never else (*self.task.conditions, STOPPED)
 
     def open(self) -> Environment:
         """Start the simulated environment; close it, or use it in a `with` block."""
         return self.build()
 
     def gap(self, level: str) -> PhysicsRanges:
-        """Ranges of a sim-to-real gap level; an unknown one raises `LookupError` and names the nearest."""
-        return self.gaps[known(level, "gap level", self.gaps)]
+        """Ranges of a sim-to-real gap level, or those written out, such as `friction=1:2.5,restitution=0.05`.
+
+        Parameters that are not written out keep the middle of their range of data collection.
+
+        Raises:
+            LookupError: when there is no such level or no such parameter; the message names the nearest.
+            ValueError: when a range is not written as `workers.physics.ranges` reads it, or is impossible.
+        """
+        if "=" not in level:
+            return self.gaps[known(level, "gap level", self.gaps)]
+        fixed = {name: ((low + high) / 2,) * 2 for name, (low, high) in self.physics.intervals.items()}
+        written = ranges(level).intervals
+        for name in written:
+            known(name, "physics parameter", fixed)
+        return PhysicsRanges({**fixed, **written})
 
 
 def known(name: str, kind: str, names: Mapping[str, object]) -> str:

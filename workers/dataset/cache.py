@@ -15,6 +15,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns
+from workers.rollout import DIVERGED
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
@@ -24,9 +25,12 @@ Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
 
 @dataclass(frozen=True)
 class TrainingCache:
-    """Memory-mapped arrays of N episodes and S = T // stride samples; diverged episodes are left out.
+    """Memory-mapped arrays of N episodes and S = T // stride samples.
+
+    Diverged episodes are left out; those that a stop rule ended are not.
 
     Attributes:
+        repeats: consecutive episodes that share a controller.
         episode: indices.
         x: controllers in [0,1]^D.
         xi: trajectories in the units of the setup's channels, the last step of every stride.
@@ -35,6 +39,7 @@ class TrainingCache:
         f: objective.
     """
 
+    repeats: int
     episode: Int64[np.ndarray, " n"]
     x: Float32[np.ndarray, "n d"]
     xi: Float32[np.ndarray, "n obs samples"]
@@ -42,13 +47,17 @@ class TrainingCache:
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
 
+    def controller(self) -> Int64[np.ndarray, " n"]:
+        """The number of each row's controller; rows with the same number have the same x."""
+        return np.asarray(self.episode) // self.repeats
+
     def held_out(self) -> np.ndarray:
-        """Rows kept from training: every tenth episode by its index, however far the data grows."""
-        return np.flatnonzero(np.asarray(self.episode) % 10 == 9)
+        """Rows kept from training: those of every tenth controller, however far the data grows."""
+        return np.flatnonzero(self.controller() % 10 == 9)
 
     def training(self) -> np.ndarray:
         """Rows to train on."""
-        return np.flatnonzero(np.asarray(self.episode) % 10 != 9)
+        return np.flatnonzero(self.controller() % 10 != 9)
 
 
 def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache:
@@ -67,7 +76,7 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
     if not (folder / _READY).exists():
         _build(dataset, stride, folder)
     arrays = {name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in _ARRAYS}
-    return TrainingCache(**arrays)
+    return TrainingCache(dataset.identity.repeats, **arrays)
 
 
 def _build(dataset: Dataset, stride: int, folder: Path) -> None:
@@ -151,7 +160,7 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
 
 
 def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
-    sane = np.array([stop == "" for stop in columns.stop])
+    sane = np.array([stop != DIVERGED for stop in columns.stop])
     last = slice(stride - 1, samples * stride, stride)
     return {
         "episode": columns.episode[sane],

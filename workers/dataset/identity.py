@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from importlib.metadata import version
 from typing import Any
 
@@ -16,6 +16,9 @@ SCHEMA_VERSION = 1
 @dataclass(frozen=True)
 class Identity:
     """Two datasets with equal identities hold equal episodes; unequal ones never mix.
+
+    A field with a default came later than the first datasets and is left out of the JSON while it has its
+    default: those datasets keep their digest.
 
     Attributes:
         setup: its name.
@@ -31,6 +34,7 @@ class Identity:
         rollout_version: of the simulation's code.
         pybullet: version.
         numpy: version.
+        repeats: R, episodes of each controller, under different physics each.
     """
 
     setup: str
@@ -46,11 +50,13 @@ class Identity:
     rollout_version: int
     pybullet: str
     numpy: str
+    repeats: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse shards without episodes."""
-        if self.episodes_per_shard < 1:
-            raise ValueError(f"episodes_per_shard must be at least 1, got {self.episodes_per_shard}")
+        """Refuse shards without episodes, and controllers without them."""
+        for name in ("episodes_per_shard", "repeats"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
 
     @property
     def digest(self) -> str:
@@ -59,7 +65,9 @@ class Identity:
 
     def to_json(self) -> str:
         """Canonical JSON: sorted keys, no spaces."""
-        return json.dumps(asdict(self), sort_keys=True, separators=(",", ":"))
+        later = {field.name: field.default for field in fields(self) if field.default is not MISSING}
+        values = {name: value for name, value in asdict(self).items() if later.get(name, MISSING) != value}
+        return json.dumps(values, sort_keys=True, separators=(",", ":"))
 
     @classmethod
     def from_json(cls, text: str) -> "Identity":
@@ -88,7 +96,7 @@ class Identity:
         )
 
 
-def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int) -> Identity:
+def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1) -> Identity:
     """The identity of a dataset collected now, with this code and these libraries."""
     return Identity(
         setup=setup.name,
@@ -104,6 +112,7 @@ def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int) -> Identity
         rollout_version=ROLLOUT_VERSION,
         pybullet=version("pybullet"),
         numpy=version("numpy"),
+        repeats=repeats,
     )
 
 

@@ -12,7 +12,8 @@ class Task(ABC):
     """Bad conditions and an objective over the T steps of an episode.
 
     Class attributes of a concrete task:
-        conditions: names of the bad conditions, at most 8 (one bit each in the dataset).
+        conditions: names of the bad conditions, at most 7, for a step has 8 bits in the dataset and one
+            may be `stopped`.
     """
 
     conditions: tuple[str, ...]
@@ -24,3 +25,7 @@ class Task(ABC):
     @abstractmethod
     def objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:
         """f, the number Bayesian optimisation maximises."""
+
+    def stopped_objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:
+        """The objective of an episode that a stop rule ended: f of the steps it ran, which are `observed`."""
+        return self.objective(observed, bad)

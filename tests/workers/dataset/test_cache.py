@@ -35,6 +35,16 @@ def test_diverged_episodes_are_left_out(dataset, tmp_path):
     assert not set(cache.episode.tolist()) & {3, 10, 17}
 
 
+def test_stopped_episodes_may_be_learnt_from_and_diverged_ones_may_not(guarded, tmp_path):
+    cache = training_cache(guarded, 5, tmp_path)
+    assert cache.episode.tolist() == [index for index in range(16) if index not in (3, 10)]
+    assert guarded.sane_episodes() == 14
+    stopped = np.isin(cache.episode, (1, 6, 11))
+    assert np.all(cache.bad[stopped][:, 2:] == 1.0)  # steps 14 and 19 of 20, stopped at 11
+    assert np.all(cache.xi[stopped][:, :, 2] == cache.xi[stopped][:, :, 3])
+    assert np.all(cache.f[stopped] == -2.0)
+
+
 def test_the_arrays_are_memory_mapped_and_read_only(dataset, tmp_path):
     cache = training_cache(dataset, 5, tmp_path)
     assert isinstance(cache.xi, np.memmap)
@@ -127,7 +137,7 @@ def test_two_processes_that_build_at_once_end_with_one_cache(dataset, tmp_path):
     )
     command = [sys.executable, "-c", script, str(dataset.folder), str(tmp_path / "cache")]
     both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    printed = [process.communicate(timeout=120)[0].splitlines()[-1] for process in both]
+    printed = [process.communicate(timeout=300)[0].splitlines()[-1] for process in both]
     assert [process.returncode for process in both] == [0, 0]
     expected = float(training_cache(dataset, 5, tmp_path / "alone").xi.sum())
     assert printed == [str(expected)] * 2

@@ -1,0 +1,115 @@
+"""What a controller does not decide: how its repeats under different physics differ among themselves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int64
+
+from workers.dataset.folder import Dataset
+from workers.dataset.schema import read_outcomes
+from workers.rollout import DIVERGED
+
+TRAJECTORIES = 1_000
+"""At most so many episodes are read for the share of ξ."""
+
+
+@dataclass(frozen=True)
+class Irreducible:
+    """What remains unknown of an episode for whoever knows its controller, but not its physics.
+
+    Controllers with a repeat that is missing or diverged are left out. NaN where nothing varies.
+
+    Attributes:
+        controllers: how many the shares of y and f come from.
+        y: share of the variance of y.
+        f: share of the variance of f.
+        xi: bounds of the least mean absolute error of ξ in parts of that of the per-step median, averaged
+            over the channels that move: as `gen_norm` of a training measures it. The lower one predicts a
+            repeat by the median of its controller's repeats, the upper one by the median of the others.
+    """
+
+    controllers: int
+    y: float
+    f: float
+    xi: tuple[float, float]
+
+
+def irreducible(dataset: Dataset) -> Irreducible | None:
+    """The irreducible part of a dataset with repeats; None when it has fewer than two whole controllers.
+
+    Raises:
+        ValueError: a file is damaged, or the dataset has no repeats.
+    """
+    repeats = dataset.identity.repeats
+    if repeats < 2:
+        raise ValueError(f"{dataset.folder} must hold repeats of its controllers, got repeats = {repeats}")
+    shards = dataset.shards()
+    parts = [read_outcomes(dataset.path(shard), dataset.identity) for shard in shards]
+    episode = [index for shard in shards for index in range(shard.start, shard.stop)]
+    rows = _whole(episode, [stop for part in parts for stop in part.stop], repeats)
+    if len(rows) < 2:
+        return None
+    y, f = (np.concatenate([getattr(part, name) for part in parts])[rows] for name in ("y", "f"))
+    xi = error_bounds(_trajectories(dataset))
+    return Irreducible(len(rows), share(y.astype(np.float64)), share(f.astype(np.float64)), xi)
+
+
+def share(values: Float64[np.ndarray, "controllers repeats"]) -> float:
+    """Variance within controllers in parts of the variance of one episode, both estimated without bias.
+
+    The latter is half the mean squared difference of two episodes of different controllers.
+    """
+    controllers, repeats = values.shape
+    count = values.size
+    within = values.var(axis=1)
+    total = (count**2 * values.var() - repeats**2 * within.sum()) / (count**2 - controllers * repeats**2)
+    return float(within.mean() * repeats / (repeats - 1) / total) if total > 0.0 else float("nan")
+
+
+def error_bounds(xi: Float32[np.ndarray, "controllers repeats obs time"]) -> tuple[float, float]:
+    """The two numbers of `Irreducible.xi`, of trajectories in any units."""
+    ratios = [
+        (_own(channel) / spread, _others(channel) / spread)
+        for channel in np.moveaxis(xi, 2, 0)
+        if (spread := float(np.abs(channel - np.median(channel, axis=(0, 1))).mean())) > 0.0
+    ]
+    low, high = np.mean(ratios, axis=0) if ratios else (np.nan, np.nan)
+    return float(low), float(high)
+
+
+def _own(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
+    return float(np.abs(channel - np.median(channel, axis=1, keepdims=True)).mean())
+
+
+def _others(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
+    errors = [
+        np.abs(channel[:, one] - np.median(np.delete(channel, one, axis=1), axis=1)).mean()
+        for one in range(channel.shape[1])
+    ]
+    return float(np.mean(errors))
+
+
+def _whole(
+    episode: Sequence[int], stop: Sequence[str], repeats: int
+) -> Int64[np.ndarray, "controllers repeats"]:
+    """Rows, in ascending episodes, of the controllers of which every repeat is there and none diverged."""
+    sane = np.flatnonzero([reason != DIVERGED for reason in stop])
+    numbers = np.asarray(episode, dtype=np.int64)[sane] // repeats
+    _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
+    return sane[first[counts == repeats][:, None] + np.arange(repeats)]
+
+
+def _trajectories(dataset: Dataset) -> Float32[np.ndarray, "controllers repeats obs time"]:
+    """Of the first whole controllers, from as few files as hold `TRAJECTORIES` episodes."""
+    episode: list[int] = []
+    stop: list[str] = []
+    xi = []
+    for _, columns in dataset.batches():
+        episode += columns.episode.tolist()
+        stop += columns.stop
+        xi.append(columns.xi)
+        if len(episode) >= TRAJECTORIES:
+            break
+    rows = _whole(episode, stop, dataset.identity.repeats)
+    return np.concatenate(xi)[rows[: TRAJECTORIES // dataset.identity.repeats]]
