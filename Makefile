@@ -29,8 +29,8 @@ demo: $(STAMP) ## the whole pipeline, small and real: collect, train, compare
 test: $(STAMP) ## the tests that take seconds each
 	$(BIN)/python -m pytest
 
-test-slow: $(STAMP) ## the tests that take minutes
-	$(BIN)/python -m pytest -m slow
+test-slow: $(STAMP) ## the tests that take minutes, and the property tests with fresh examples
+	HYPOTHESIS_PROFILE=exploring $(BIN)/python -m pytest -m "slow or hypothesis"
 
 chaos: $(STAMP) ## the tests that kill processes on purpose
 	$(BIN)/python -m pytest -m chaos

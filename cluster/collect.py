@@ -21,6 +21,7 @@ from workers.collection import ShardReport
 from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import Identity, identity_of
+from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
 from workers.setups import Setup
 
@@ -28,6 +29,9 @@ _DISK = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
     *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
 }
+
+_ENDING_SECONDS = 10.0
+"""What a worker process may take to end once it was told to."""
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
@@ -66,8 +70,12 @@ def collect(
     }
     with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
         tally = Tally()
-        with _pool(dataset, settings, actors) as pool:
-            _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+        pool = _pool(dataset, settings, actors)
+        try:
+            with pool:
+                _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+        finally:
+            _clean(dataset, pool.answers)
         _record(dataset, episodes, tally, run)
     return dataset
 
@@ -96,6 +104,12 @@ def _pool(dataset: Dataset, settings: CollectSettings, actors: int) -> Pool[Shar
             seconds=settings.shard_timeout_seconds,
         ),
     )
+
+
+def _clean(dataset: Dataset, writers: list[str]) -> None:
+    """Leave no unfinished file behind, however the work ended."""
+    wait_for_end(writers, _ENDING_SECONDS)
+    shards.sweep(dataset.folder)
 
 
 def _gather(
@@ -136,7 +150,6 @@ def _unwritable(dataset: Dataset, error: OSError) -> UserError:
 
 def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
     """Say first how it went: the store may fail."""
-    shards.sweep(dataset.folder)
     release(dataset)
     metrics = tally.metrics()
     say(

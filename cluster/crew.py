@@ -59,6 +59,7 @@ class Crew(Generic[Item]):
         self._manned = time.monotonic()  # when an actor was last seen ready
         self._complaint = ""
         self.members: list[Member[Item]] = [Member() for _ in range(size)]
+        self.answers: list[Any] = []  # the first one of every actor there ever was
 
     def tend(self) -> None:
         """Start actors in empty places.
@@ -93,7 +94,7 @@ class Crew(Generic[Item]):
             UserError: an actor of the beginning cannot start; it would not with any item.
         """
         try:
-            ray.get(member.starting)
+            answer = ray.get(member.starting)
         except RayError as error:
             if not member.is_replacement:
                 raise UserError(f"a worker process cannot start: {in_one_line(error)}") from error
@@ -102,6 +103,7 @@ class Crew(Generic[Item]):
             member.due = time.monotonic() + _RETRY_SECONDS
         else:
             member.starting = None
+            self.answers.append(answer)
 
     def replace(self, member: Member[Item]) -> list[Item]:
         """Empty a place, for `tend` to fill it; returns the items its actor had, oldest first."""

@@ -58,7 +58,6 @@ def demo(
     Raises:
         UserError: a stage cannot run; the cluster is checked for all of them before the first.
     """
-    setup = setups.load(SETUP)
     _preflight(settings, size, session)
     say(
         f"The main job at toy size, in {folder}: {size.episodes} simulated episodes instead of 500,000, "
@@ -67,7 +66,7 @@ def demo(
     )
     with timed("1/3 collect"):
         collect(
-            setup=setup,
+            setup=setups.load(SETUP),
             episodes=size.episodes,
             folder=folder / "dataset",
             seed=0,
@@ -76,31 +75,41 @@ def demo(
             tracker=tracker,
         )
     with timed("2/3 train"):
-        train(
-            folder=folder / "dataset",
-            model=folder / "model",
-            preset="compact",
-            seed=0,
-            settings=settings.train.model_copy(
-                update={"updates": size.updates, "cache_folder": folder / "cache"}
-            ),
-            session=session,
-            tracker=tracker,
-        )
+        _train(folder, settings, session, tracker, size)
     with timed("3/3 compare"):
-        comparison = compare(
-            setup=setup,
-            grid=Grid(size.methods, seed=0, runs=size.runs),
-            trials=size.trials,
-            gap="paper",
-            model=folder / "model",
-            folder=folder / "comparison",
-            settings=settings.compare,
-            session=session,
-            tracker=tracker,
-        )
+        comparison = _compare(folder, settings, session, tracker, size)
     say(conclusion(folder, comparison, f"svaedc ui --set tracking.uri={tracker.uri}"))
     return comparison
+
+
+def _train(folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize) -> None:
+    train(
+        folder=folder / "dataset",
+        model=folder / "model",
+        preset="compact",
+        seed=0,
+        settings=settings.train.model_copy(
+            update={"updates": size.updates, "cache_folder": folder / "cache"}
+        ),
+        session=session,
+        tracker=tracker,
+    )
+
+
+def _compare(
+    folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize
+) -> Comparison:
+    return compare(
+        setup=setups.load(SETUP),
+        grid=Grid(size.methods, seed=0, runs=size.runs),
+        trials=size.trials,
+        gap="paper",
+        model=folder / "model",
+        folder=folder / "comparison",
+        settings=settings.compare,
+        session=session,
+        tracker=tracker,
+    )
 
 
 def _preflight(settings: Settings, size: DemoSize, session: Session) -> None:

@@ -81,6 +81,11 @@ class Pool(Generic[Item, Result]):
         self._queue: deque[Item] = deque()
         self._attempts: Counter[Item] = Counter()
 
+    @property
+    def answers(self) -> list[Any]:
+        """What the actors' `ready` returned, those of actors that were replaced included."""
+        return self._crew.answers
+
     def __enter__(self) -> "Pool[Item, Result]":
         return self
 

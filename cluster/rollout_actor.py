@@ -7,6 +7,7 @@ from workers import setups
 from workers.collection import ShardReport, collect_shard
 from workers.dataset.folder import open_dataset
 from workers.dataset.identity import identity_of
+from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
 
 
@@ -18,8 +19,9 @@ class RolloutActor:
         self._dataset = open_dataset(Path(folder))
         self._require_same_code()
 
-    def ready(self) -> None:
-        """Answers once the process has started and found its dataset."""
+    def ready(self) -> str:
+        """The name under which this process writes files, once it has started and found its dataset."""
+        return writer()
 
     def collect(self, shard: Shard) -> ShardReport:
         """One shard, from its first episode to its name in the dataset."""

@@ -2,15 +2,12 @@
 
 import logging
 import os
-import signal
 import socket
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import FrameType
 
 import ray
 from ray._private import ray_constants
@@ -20,6 +17,7 @@ from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 
 from cluster.config import RaySettings
 from cluster.errors import UsageError, UserError
+from cluster.termination import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
 TOKEN_REMEDY = (
@@ -81,7 +79,7 @@ def connect(settings: RaySettings, address: str | None) -> Iterator[Session]:
     else:
         _start(settings)
     try:
-        with _terminating_as_exit():
+        with terminating_as_exit():
             yield _session(is_local=not wanted)
     finally:
         ray.shutdown()
@@ -194,20 +192,3 @@ def _stay_on_loopback() -> None:
     """
     os.environ[ray_constants.ENABLE_RAY_CLUSTERS_ENV_VAR] = "0"
     ray_constants.ENABLE_RAY_CLUSTER = False
-
-
-@contextmanager
-def _terminating_as_exit() -> Iterator[None]:
-    """Lets SIGTERM (`ray job stop`) unwind the stack; `ray.init` replaces handlers set before it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def leave(_number: int, _frame: FrameType | None) -> None:
-        raise SystemExit(128 + signal.SIGTERM)
-
-    previous = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)

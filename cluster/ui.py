@@ -9,10 +9,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 
 from cluster.config import TrackingSettings
 from cluster.errors import UsageError, UserError
+from cluster.termination import terminating_as_exit
 from cluster.tracking import UI_PORT, open_tracker
 
 HOST = "127.0.0.1"
@@ -38,7 +38,7 @@ def serve_ui(settings: TrackingSettings, port: int, announce: Callable[[str], No
     if tracker.uri.startswith("http"):
         raise UsageError(f"tracking.uri is a server already, open {tracker.page} in a browser")
     _require_free(port)
-    with _terminating_as_exit(), _server(tracker.uri, port) as server:
+    with terminating_as_exit(), _server(tracker.uri, port) as server:
         _wait_until_up(server, port)
         announce(tracker.page.replace(f":{UI_PORT}/", f":{port}/"))
         server.wait()
@@ -111,17 +111,3 @@ def _wait_until_up(server: subprocess.Popen[bytes], port: int) -> None:
                 return
         time.sleep(0.2)
     raise UserError(f"the MLflow server did not answer on {HOST}:{port}; its own message is above")
-
-
-@contextmanager
-def _terminating_as_exit() -> Iterator[None]:
-    """Lets SIGTERM unwind the stack, so that the server is ended too."""
-
-    def leave(_number: int, _frame: FrameType | None) -> None:
-        raise SystemExit(128 + signal.SIGTERM)
-
-    previous = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)

@@ -6,6 +6,14 @@ import socket
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# No test asserts a time, the machine may be busy; and the same examples every time, so that a failure belongs
+# to the change that caused it: `make test-slow` explores new ones.
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("repeatable", settings.get_profile("untimed"), derandomize=True)
+settings.register_profile("exploring", settings.get_profile("untimed"), max_examples=500)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
 # Nothing in a test reports home, and every process has one thread: tests share few cores.
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"

@@ -15,6 +15,8 @@ MODULES = {
     "daisy-27d": "workers.environments.daisy_27d",
     "daisy-11d": "workers.environments.daisy_11d",
     "daisy-11d-rehearsal": "workers.environments.daisy_11d_rehearsal",
+    "quadratic-30d": "workers.environments.quadratic_30d",
+    "quadratic-30d-intrinsic-3": "workers.environments.quadratic_30d_intrinsic_3",
 }
 """A new robot is one module that offers `setup()`, and one line here."""
 

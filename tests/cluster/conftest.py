@@ -55,12 +55,12 @@ def head(tmp_path_factory):
         yield Head(f"127.0.0.1:{port}", f"http://127.0.0.1:{dashboard}", token, folder, home)
     finally:
         process.send_signal(signal.SIGTERM)
-        process.wait(timeout=60)
+        process.wait(timeout=180)
 
 
 def wait_until_served(process: subprocess.Popen, ports: list[int], log: Path) -> None:
     """Returns when all ports answer; fails with the head's own output."""
-    deadline = time.monotonic() + 90
+    deadline = time.monotonic() + 300
     while not all(answers(port) for port in ports):
         if process.poll() is not None or time.monotonic() > deadline:
             pytest.fail(f"ray start did not come up: {log.read_text()}")

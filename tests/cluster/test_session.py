@@ -45,7 +45,7 @@ def join(head, address, **environment) -> str:
     command = [sys.executable, "-c", JOIN, address, str(head.folder)]
     clean |= {"RAY_USAGE_STATS_ENABLED": "0", "HOME": str(head.home), **environment}
     return subprocess.run(
-        command, env=clean, capture_output=True, text=True, timeout=60, check=True
+        command, env=clean, capture_output=True, text=True, timeout=180, check=True
     ).stdout.strip()
 
 

@@ -53,7 +53,7 @@ def test_an_interrupted_training_says_that_it_goes_on_and_nothing_else(
         wait_for(tmp_path / "model" / "training.pt", process)
         # Ctrl-C reaches every process of the terminal, SIGTERM only the one it is meant for.
         (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
-        _, told = process.communicate(timeout=120)
+        _, told = process.communicate(timeout=300)
     assert process.returncode == code, told
     lines = [each for each in told.splitlines() if " updates, " not in each]
     assert lines == ["stopped: everything finished is kept, and the same command goes on from here"]

@@ -122,9 +122,9 @@ def test_physics_with_an_unknown_or_missing_parameter_is_refused(setup, environm
     x = np.full(setup.dimensions, 0.5)
     with pytest.raises(ValueError, match="gravity"):
         rollout(setup, environment, x, _nominal(setup) | {"gravity": 9.81})
-    name, *_ = _nominal(setup)
-    with pytest.raises(ValueError, match=name):
-        rollout(setup, environment, x, {k: v for k, v in _nominal(setup).items() if k != name})
+    for name in _nominal(setup):
+        with pytest.raises(ValueError, match=name):
+            rollout(setup, environment, x, {k: v for k, v in _nominal(setup).items() if k != name})
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_episodes_are_bit_identical_in_a_fresh_process(setup, episodes):
         "print(json.dumps(digests))\n"
     )
     command = [sys.executable, "-c", script, setup.name, str(setup.horizon)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     expected = [
         hashlib.sha256(episodes[index].xi.tobytes() + episodes[index].bad.tobytes()).hexdigest()
         for index in (4, 1)
@@ -206,7 +206,7 @@ def test_gymnasium_steps_reproduce_a_rollout_bit_for_bit(setup):
     assert np.array_equal(np.stack([observation for observation, *_ in seen], axis=1), expected.xi)
     assert [info["bad"] for *_, info in seen] == (expected.bad != 0).tolist()
     assert [reward for _, reward, *_ in seen[:-1]] == [0.0] * (setup.horizon - 1)
-    assert seen[-1][1] == pytest.approx(expected.f, abs=1e-6)
+    assert np.float32(seen[-1][1]) == expected.f
     ends = [truncated for *_, truncated, _ in seen]
     assert ends == [False] * (setup.horizon - 1) + [True]
 

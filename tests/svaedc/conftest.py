@@ -2,11 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import settings
-
-# No test asserts a time; the machine may be busy.
-settings.register_profile("untimed", deadline=None)
-settings.load_profile("untimed")
 
 CONTROLLER, OBSERVATIONS, STEPS = 6, 5, 40
 

@@ -119,7 +119,7 @@ def test_a_collection_killed_midway_is_completed_to_the_same_bytes(tmp_path, who
 def test_a_file_that_may_not_grow_is_an_os_error_and_publishes_nothing(tmp_path):
     dataset = _new(tmp_path / "dataset")
     failed = _start(dataset, largest_file=50_000)
-    _, error = failed.communicate(timeout=120)
+    _, error = failed.communicate(timeout=300)
     assert failed.returncode == 1
     assert "OSError: [Errno 27]" in error
     assert dataset.shards() == []

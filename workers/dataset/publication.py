@@ -3,14 +3,15 @@
 import os
 import re
 import socket
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 WRITING = ".writing"
 """Folder, below the dataset, of files that are not finished."""
 
-_WRITER = re.compile(r".*\.(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)")
+_WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)")
 
 
 @contextmanager
@@ -55,6 +56,19 @@ def is_dead(name: str) -> bool:
     if match is None or match["host"] != _host():
         return False
     return match["boot"] != _boot() or not _alive(int(match["pid"]))
+
+
+def wait_for_end(writers: Iterable[str], seconds: float) -> None:
+    """Wait until processes of this machine that were told to end have ended, or the time is over.
+
+    Args:
+        writers: what `writer` returned in them; those of other machines are not waited for.
+        seconds: the longest wait.
+    """
+    deadline = time.monotonic() + seconds
+    own = [name for name in writers if name.startswith(f"{_host()}.")]
+    while time.monotonic() < deadline and not all(is_dead(name) for name in own):
+        time.sleep(0.02)
 
 
 def _alive(pid: int) -> bool:

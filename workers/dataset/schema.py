@@ -77,7 +77,7 @@ def schema(identity: Identity) -> pa.Schema:
             }
         ),
     }
-    columns = {
+    columns: dict[str, pa.DataType] = {
         "episode": pa.int64(),
         "x": pa.list_(pa.field("element", pa.float32(), nullable=False), len(identity.parameters)),
         "xi": pa.list_(pa.field("element", pa.float32(), nullable=False), size),
@@ -85,8 +85,9 @@ def schema(identity: Identity) -> pa.Schema:
         "y": pa.float32(),
         "f": pa.float32(),
         "stop": pa.dictionary(pa.int8(), pa.string()),
-        "physics": physics,
     }
+    if identity.physics:  # Parquet knows no structs without fields
+        columns["physics"] = physics
     return pa.schema(
         [pa.field(name, kind, nullable=False) for name, kind in columns.items()], metadata=metadata
     )
@@ -104,8 +105,9 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         "y": pa.array([episode.y for episode in episodes], type=kinds["y"]),
         "f": pa.array([episode.f for episode in episodes], type=kinds["f"]),
         "stop": pa.array([episode.stop for episode in episodes]).dictionary_encode().cast(kinds["stop"]),
-        "physics": pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"]),
     }
+    if "physics" in kinds:
+        arrays["physics"] = pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"])
     pq.write_table(
         pa.table(arrays, schema=layout),
         path,

@@ -109,7 +109,7 @@ def test_of_two_processes_that_grant_at_once_one_wins(processes, tmp_path, attem
     both = [processes.Process(target=grant, args=(tmp_path, n, barrier, answers)) for n in range(2)]
     for process in both:
         process.start()
-    assert sorted(answers.get(timeout=30) for _ in both) == ["granted", "taken"]
+    assert sorted(answers.get(timeout=180) for _ in both) == ["granted", "taken"]
     for process in both:
         process.join()
     with closing(opened(tmp_path)) as book:

@@ -160,7 +160,7 @@ def test_the_lock_names_the_process_that_holds_it_and_dies_with_it(processes, tm
     held, let_go = processes.Event(), processes.Event()
     process = processes.Process(target=hold, args=(tmp_path, held, let_go))
     process.start()
-    assert held.wait(timeout=30)
+    assert held.wait(timeout=180)
     assert operator.lock.holder(tmp_path) == replace(Process.own(), pid=process.pid)
     with pytest.raises(FolderTaken, match=f"process {process.pid}"):
         FolderLock(tmp_path, 0.2)

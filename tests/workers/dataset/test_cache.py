@@ -127,7 +127,7 @@ def test_two_processes_that_build_at_once_end_with_one_cache(dataset, tmp_path):
     )
     command = [sys.executable, "-c", script, str(dataset.folder), str(tmp_path / "cache")]
     both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    printed = [process.communicate(timeout=120)[0].splitlines()[-1] for process in both]
+    printed = [process.communicate(timeout=300)[0].splitlines()[-1] for process in both]
     assert [process.returncode for process in both] == [0, 0]
     expected = float(training_cache(dataset, 5, tmp_path / "alone").xi.sum())
     assert printed == [str(expected)] * 2

@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers.dataset import schema, shards
-from workers.dataset.publication import WRITING, writer
+from workers.dataset.publication import WRITING, is_dead, wait_for_end, writer
 from workers.dataset.shards import Shard
 
 SHARD = Shard(8, 16)
@@ -158,7 +159,7 @@ def test_a_writer_killed_at_any_moment_leaves_a_dataset_that_a_rerun_completes(t
         folder = tmp_path / "killed"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        died = subprocess.run([sys.executable, "-c", KILLED_AT, str(folder), str(moment)], timeout=60)
+        died = subprocess.run([sys.executable, "-c", KILLED_AT, str(folder), str(moment)], timeout=180)
         if died.returncode == 0:
             survived_after = moment
             break
@@ -190,6 +191,17 @@ def test_sweeping_spares_living_writers_and_those_of_other_machines(tmp_path):
         (writing / name).write_bytes(b"half")
     assert shards.sweep(tmp_path) == 2
     assert sorted(path.name for path in writing.iterdir()) == sorted(living)
+
+
+def test_waiting_for_a_writer_lasts_until_its_process_is_gone_and_no_longer_than_allowed():
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        host, boot, _ = writer().split(".")
+        names = [f"{host}.{boot}.{process.pid}", f"elsewhere.{boot}.1", f"{host}.another-boot.{process.pid}"]
+        wait_for_end(names, 0.0)
+        assert not is_dead(names[0])
+        threading.Timer(0.3, process.communicate).start()  # its end: input() finds nothing more
+        wait_for_end(names, 60.0)
+        assert is_dead(names[0])
 
 
 def test_sweeping_a_folder_that_never_wrote_is_harmless(tmp_path):

@@ -1,0 +1,28 @@
+"""SIGTERM as an ordinary way to end: what was begun is cleaned up."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+@contextmanager
+def terminating_as_exit() -> Iterator[None]:
+    """Lets SIGTERM (`ray job stop`, a service manager) unwind the stack inside the block.
+
+    Enter it after `ray.init`, which replaces the handlers set before it. In a thread, which may not set
+    handlers, it does nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        raise SystemExit(128 + signal.SIGTERM)
+
+    previous = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
