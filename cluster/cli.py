@@ -84,6 +84,10 @@ def collect(
     repeats: Annotated[
         int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
     ] = 1,
+    bad: Annotated[
+        str,
+        typer.Option("--bad", metavar="MODULE:FUNCTION", help="G_bad of your own instead of the setup's."),
+    ] = "",
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -96,7 +100,7 @@ def collect(
     """
     from cluster.collect import collect as run_collect
 
-    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    settings, chosen = settings_of(config, overrides), setup_of(setup, bad)
     with _services(settings, address) as (session, tracker):
         run_collect(
             setup=chosen,

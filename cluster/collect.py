@@ -64,6 +64,7 @@ def collect(
         "episodes": episodes,
         "seed": seed,
         "repeats": repeats,
+        "bad": identity.bad_name,
         "actors": actors,
         "identity": dataset.identity.digest[:12],
         **settings.model_dump(mode="json"),

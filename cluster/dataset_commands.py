@@ -11,6 +11,7 @@ from cluster.errors import UserError
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.identity import Identity
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 from workers.dataset.verification import gaps, verify
@@ -42,6 +43,7 @@ def info(folder: Folder) -> None:
         "observation": f"{len(identity.observation)} channels",
         "controller": f"{len(identity.parameters)} parameters",
         "seed": str(identity.seed),
+        "G_bad": _g_bad(identity),
         "repeats": f"{identity.repeats} of each controller",
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
@@ -68,6 +70,11 @@ def _described(found: Statistics) -> dict[str, str]:
         "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
         "diverged": str(found.diverged),
     }
+
+
+def _g_bad(identity: Identity) -> str:
+    name = f"{identity.bad_name} ({identity.bad_digest[:12]})" if identity.bad_name else "the setup's own"
+    return f"{name}, {identity.bad_kind}"
 
 
 def _irreducible(dataset: Dataset) -> dict[str, str]:

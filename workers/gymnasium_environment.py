@@ -24,8 +24,8 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     | end | truncated after the setup's horizon; terminated when the simulation explodes |
 
     An episode that explodes is bad, ends with its last sane observation and has f's lower limit for a reward,
-    as in a rollout. `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's
-    `physics`.
+    as in a rollout. `info` holds `bad`, whether a bad condition holds or how bad the step is (G_bad sees that
+    step alone), and after `reset` the episode's `physics`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -48,7 +48,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._records = []
         observed = self._environment.observed([self._environment.record()])
         self._last = self._row(observed)
-        return self._last, {"physics": physics, "bad": bool(self._setup.task.is_bad(observed).any())}
+        return self._last, {"physics": physics, "bad": self._bad(observed)}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply one command for one control step."""
@@ -60,8 +60,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._records.append(record)
         self._last = self._row(observed)
         ended = len(self._records) >= self._setup.horizon
-        bad = bool(self._setup.task.is_bad(observed).any())
-        return self._last, self._objective() if ended else 0.0, False, ended, {"bad": bad}
+        return self._last, self._objective() if ended else 0.0, False, ended, {"bad": self._bad(observed)}
 
     def close(self) -> None:
         """End the simulation."""
@@ -69,6 +68,9 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _row(self, observed: Observed) -> np.ndarray:
         return np.clip(observed.xi[:, 0], self._seen.low, self._seen.high)
+
+    def _bad(self, observed: Observed) -> bool | float:
+        return self._setup.task.is_bad(observed).max().item()
 
     def _objective(self) -> float:
         whole = self._environment.observed(self._records)

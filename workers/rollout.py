@@ -13,13 +13,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Float32, UInt8
 
 from workers.controllers.controller import unit_cube
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
+from workers.tasks.task import Bad
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -34,8 +35,8 @@ class Episode:
     Attributes:
         x: the controller, in [0,1]^D.
         xi: the trajectory ξ, in the units of the setup's channels.
-        bad: per step, one bit for each bad condition.
-        y: badness, the fraction of bad steps, in [0, 1].
+        bad: per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad.
+        y: badness, the fraction of bad steps or the mean degree, in [0, 1].
         f: the objective.
         stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded.
         physics: the parameters it ran under.
@@ -43,7 +44,7 @@ class Episode:
 
     x: Float32[np.ndarray, " d"]
     xi: Float32[np.ndarray, "obs time"]
-    bad: UInt8[np.ndarray, " time"]
+    bad: UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
     y: float
     f: float
     stop: str
@@ -94,8 +95,8 @@ def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) 
     return Episode(
         x=x,
         xi=observed.xi,
-        bad=_bits(is_bad),
-        y=float(is_bad.any(axis=0).mean()),
+        bad=_stored(is_bad),
+        y=float(is_bad.max(axis=0).mean(dtype=np.float64)),
         f=float(np.float32(setup.task.objective(observed, is_bad))),
         stop="",
         physics=physics,
@@ -109,7 +110,7 @@ def _diverged(setup: Setup, observed: Observed, sane: int, x: np.ndarray, physic
         xi[:] = np.array([(channel.low + channel.high) / 2 for channel in setup.observation])[:, None]
     else:
         xi[:, sane:] = xi[:, sane - 1 : sane]
-    bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
+    bad = _stored(np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool))
     return Episode(x, xi, bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
@@ -127,6 +128,6 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     return int(insane[0]) if insane.size else xi.shape[1]
 
 
-def _bits(is_bad: Bool[np.ndarray, "conditions time"]) -> UInt8[np.ndarray, " time"]:
-    """One bit per condition, the first condition lowest."""
-    return np.packbits(is_bad, axis=0, bitorder="little")[0]
+def _stored(is_bad: Bad) -> UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]:
+    """Degrees as they are; otherwise one bit per condition, the first condition lowest."""
+    return is_bad[0] if is_bad.dtype == np.float32 else np.packbits(is_bad, axis=0, bitorder="little")[0]

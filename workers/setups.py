@@ -2,8 +2,10 @@
 
 import difflib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
 
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
@@ -18,7 +20,7 @@ MODULES = {
     "quadratic-30d": "workers.environments.quadratic_30d",
     "quadratic-30d-intrinsic-3": "workers.environments.quadratic_30d_intrinsic_3",
 }
-"""A new robot is one module that offers `setup()`, and one line here."""
+"""A new robot is one module that offers `setup()`, and one line here; none for a module of the user's own."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Setup:
     """A robot, its controller and its task.
 
     Attributes:
-        name: as on the command line.
+        name: as on the command line; of a user's module, the module's name.
         build: makes the simulated environment.
         controller: the parametric controller.
         task: G_bad and the objective.
@@ -80,5 +82,32 @@ def known(name: str, kind: str, names: Mapping[str, object]) -> str:
 
 
 def load(name: str) -> Setup:
-    """The setup of that name; an unknown one raises `LookupError` and names the nearest."""
-    return import_module(MODULES[known(name, "setup", MODULES)]).setup()
+    """The setup of that name, or of the importable module of that name, which offers `setup()`.
+
+    Raises:
+        LookupError: there is neither (it names the nearest), or the module is not as it must be.
+    """
+    if name in MODULES or not _is_module(name):
+        return import_module(MODULES[known(name, "setup", MODULES)]).setup()
+    made = getattr(imported(name), "setup", lambda: None)()
+    if not isinstance(made, Setup):
+        raise LookupError(
+            f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
+        )
+    return replace(made, name=name)
+
+
+def imported(name: str) -> ModuleType:
+    """A user's module; one that cannot be imported raises `LookupError` with the reason."""
+    try:
+        return import_module(name)
+    except (ImportError, SyntaxError) as error:
+        raise LookupError(
+            f"cannot import the module {name!r}: {error}; it must be in the working directory or on "
+            "PYTHONPATH, on every machine of the cluster"
+        ) from error
+
+
+def _is_module(name: str) -> bool:
+    parts = name.split(".")
+    return all(part.isidentifier() for part in parts) and (len(parts) > 1 or find_spec(name) is not None)

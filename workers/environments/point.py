@@ -1,4 +1,4 @@
-"""A point that is where it is told to be: the environment of setups that are formulas, without a simulator."""
+"""A point that is where it is told to be: the environment of setups that are formulas."""
 
 from collections.abc import Sequence
 

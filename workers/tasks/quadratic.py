@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from workers.environments.environment import Observed
-from workers.tasks.task import Task
+from workers.tasks.task import Bad, Task
 
 SLOPE = 0.001
 """Of each coordinate that hardly matters (appendix C)."""
@@ -34,14 +34,14 @@ class Quadratic(Task):
 
     @property
     def objective_limits(self) -> tuple[float, float]:
-        """f at the corners 0 and 1, its least and greatest value."""
+        """The least and the greatest value of f, at the corners 0 and 1."""
         return float(self.intrinsic), 4.0 * self.intrinsic + SLOPE * (self.dimensions - self.intrinsic)
 
     def is_bad(self, observed: Observed) -> Bool[np.ndarray, "conditions time"]:
         """A formula has no bad steps; the one condition, x outside the unit cube, cannot come about."""
-        return ((observed.xi < 0.0) | (observed.xi > 1.0)).any(axis=0, keepdims=True)
+        return np.any((observed.xi < 0.0) | (observed.xi > 1.0), axis=0, keepdims=True)
 
-    def objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:  # noqa: ARG002
+    def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
         """The formula of the class, of the last step."""
         x = observed.xi[:, -1].astype(np.float64)
         return float(((x[: self.intrinsic] + 1) ** 2).sum() + SLOPE * x[self.intrinsic :].sum())
