@@ -45,6 +45,9 @@ def rows(observed):
     x, y, z = observed.signals["hand_position"]
     return np.stack([y > 0.2, z > 0.2, z > 9])
 
+def first_place(observed):
+    return np.clip(observed.xi[7], 0, 1)
+
 def yes_or_no(observed):
     return observed.xi[0] > 0.4
 
@@ -289,9 +292,10 @@ def test_an_episode_that_diverges_is_entirely_bad(franka):
 
 
 def test_gymnasium_reports_the_degree_of_a_step(franka):
-    adapter = SetupEnvironment(with_bad(franka, "gentle:rough"))
-    _, start = adapter.reset(seed=3)
-    *_, first = adapter.step(np.zeros(7, np.float32))
+    adapter = SetupEnvironment(with_bad(franka, "gentle:first_place"))
+    seen, start = adapter.reset(seed=3)
+    moved, *_, first = adapter.step(np.zeros(7, np.float32))
     adapter.close()
-    assert 0.0 < start["bad"] < 1.0
-    assert first["bad"] == pytest.approx(start["bad"], abs=0.3)
+    assert start["bad"] == seen[7]
+    assert first["bad"] == moved[7]
+    assert 0.0 < first["bad"] < 1.0
