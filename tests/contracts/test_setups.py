@@ -2,10 +2,12 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +19,17 @@ from workers.physics import PhysicsRanges
 from workers.randomness import generator
 from workers.rollout import Episode, random_episode, rollout
 
+EXAMPLE = str(Path(__file__).parents[2] / "examples" / "two_link_pusher")
 SHORT = 300  # control steps; whole episodes run in the slow tests
 
 
-@pytest.fixture(scope="module", params=sorted(setups.MODULES))
+@pytest.fixture(scope="module", params=[*sorted(setups.MODULES), "two_link_pusher"])
 def whole(request):
-    return setups.load(request.param)
+    """A setup that ships, or the example of a user's own, found as a user's would be."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE)
+        patch.setenv("PYTHONPATH", f"{EXAMPLE}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+        yield setups.load(request.param)
 
 
 @pytest.fixture(scope="module")
