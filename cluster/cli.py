@@ -23,6 +23,7 @@ from cluster.options import (
     interruptible,
     settings_of,
     setup_of,
+    working,
 )
 from cluster.progress import say
 
@@ -100,7 +101,7 @@ def collect(
     """
     from cluster.collect import collect as run_collect
 
-    settings, chosen = settings_of(config, overrides), setup_of(setup, bad)
+    settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
     with _services(settings, address) as (session, tracker):
         run_collect(
             setup=chosen,

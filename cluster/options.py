@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cluster.config import Settings, load_settings
-from cluster.errors import UsageError
+from cluster.errors import UsageError, UserError
 from cluster.progress import say
 from workers import setups
 from workers.setups import Setup
@@ -79,6 +79,21 @@ def setup_of(name: str, bad: str = "") -> Setup:
     sys.path.append(str(Path.cwd()))
     with usage_errors():
         return with_bad(setups.load(name), bad)
+
+
+def working(setup: Setup, seed: int) -> Setup:
+    """The setup, tried out if users supplied a part of it: before anything starts or claims a folder.
+
+    Raises:
+        UserError: it does not work.
+    """
+    from workers.collection import require_working
+
+    try:
+        require_working(setup, seed)
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    return setup
 
 
 @contextmanager

@@ -4,12 +4,11 @@ import socket
 from pathlib import Path
 
 from workers import setups
-from workers.collection import ShardReport, collect_shard
+from workers.collection import ShardReport, collect_shard, require_working
 from workers.dataset.folder import open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
-from workers.rollout import random_episode
 from workers.tasks.own_bad import with_bad
 
 
@@ -20,7 +19,7 @@ class RolloutActor:
         self._dataset = open_dataset(Path(folder))
         self._setup = with_bad(setups.load(setup), self._dataset.identity.bad_name)
         self._require_same_code()
-        self._require_working()
+        require_working(self._setup, self._dataset.identity.seed)
 
     def ready(self) -> str:
         """The name under which this process writes files, once it has started and found its dataset."""
@@ -29,12 +28,6 @@ class RolloutActor:
     def collect(self, shard: Shard) -> ShardReport:
         """One shard, from its first episode to its name in the dataset."""
         return collect_shard(self._setup, self._dataset, shard)
-
-    def _require_working(self) -> None:
-        """Roll out an episode with code that users supplied: its mistakes are no fault of a shard."""
-        if self._setup.name not in setups.MODULES or self._setup.task.bad_name:
-            with self._setup.open() as environment:
-                random_episode(self._setup, environment, self._dataset.identity.seed, 0)
 
     def _require_same_code(self) -> None:
         """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""

@@ -9,7 +9,7 @@ from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, random_episode
-from workers.setups import Setup
+from workers.setups import MODULES, Setup
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,18 @@ class ShardReport:
     size: int
     rollout_seconds: float
     storage_seconds: float
+
+
+def require_working(setup: Setup, seed: int) -> None:
+    """Roll out one episode if users supplied the robot or G_bad: their mistakes are no fault of a shard.
+
+    Raises:
+        ValueError: something in their code is not as it must be.
+        OSError: a file of theirs is missing.
+    """
+    if setup.name not in MODULES or setup.task.bad_name:
+        with setup.open() as environment:
+            random_episode(setup, environment, seed, 0)
 
 
 def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:

@@ -55,7 +55,7 @@ class Pusher(Environment):
         self._puck = Cylinder(self._world, radius=0.04, height=0.06, position=PUCK)
 
     def reset(self, physics: Physics) -> None:
-        """Everything back to its start; what touched before is forgotten, so that no episode depends on it."""
+        """Everything back to its start, and old contacts forgotten: no episode depends on those before."""
         self._puck.set_dynamics(
             mass=physics["puck_mass"],
             friction=physics["puck_friction"],

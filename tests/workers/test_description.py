@@ -6,8 +6,12 @@ from workers.simulation.bullet import pybullet
 from workers.simulation.description import joint_indices, load_robot
 from workers.simulation.world import World
 
-LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>{}</link>'
-JOINT = '<joint name="wrist" type="{}"><parent link="{}"/><child link="hand"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+LINK = '<link name="{}"><inertial><mass value="1"/>' + INERTIA + "</inertial>{}</link>"
+JOINT = (
+    '<joint name="wrist" type="{}"><parent link="{}"/><child link="hand"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+)
 MESH = '<collision><geometry><mesh filename="palm.stl"/></geometry></collision>'
 
 

@@ -1,4 +1,4 @@
-"""Robot descriptions in URDF files: loaded by Bullet, or refused with the reason and what is there instead."""
+"""Robot descriptions in URDF files: loaded by Bullet, or refused with its reason."""
 
 import ctypes
 import os
@@ -39,8 +39,8 @@ def load_robot(path: Path, client: int, **options: Any) -> int:
     except pybullet.error as error:
         reason = _PREFIX.sub(" ", _said(load)).split()
         raise ValueError(
-            f"{path} does not load as a URDF: {' '.join(reason) or 'Bullet gives no reason'}; every link, joint "
-            "and mesh it names must exist, meshes relative to the file"
+            f"{path} does not load as a URDF: {' '.join(reason) or 'Bullet gives no reason'}; every link, "
+            "joint and mesh it names must exist, meshes relative to the file"
         ) from error
 
 
