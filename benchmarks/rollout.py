@@ -1,4 +1,4 @@
-"""How much of a Franka episode is physics: CPU time of its parts as ratios, in one run, medians over rounds.
+"""How much of an episode is physics: CPU time of its parts as ratios, in one run, medians over rounds.
 
 Ratios, because they hold on a busy machine; the load is printed beside them.
 """

@@ -39,7 +39,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
-    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`. "
+    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
+    "`render` shows an episode. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
@@ -154,7 +155,9 @@ def compare(
     trials: Annotated[
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
     ] = 20,
-    gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
+    gap: Annotated[
+        str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
+    ] = "paper",
     model: TrainedModel = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
@@ -200,7 +203,9 @@ def ui(
 def _add_groups() -> None:
     from cluster.dataset_commands import app as dataset_app
     from cluster.hardware.commands import app as hardware_app
+    from cluster.render_command import render
 
+    app.command()(render)
     app.add_typer(dataset_app, name="dataset")
     app.add_typer(hardware_app, name="hardware")
 

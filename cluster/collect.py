@@ -157,8 +157,8 @@ def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
         f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
         f"{tally.episodes} new in {duration(time.monotonic() - tally.begin)} "
         f"({metrics['episodes_per_second']:.1f}/s, {metrics['core_hours']:.2f} core-hours), "
-        f"mean badness {metrics['badness']:.2f}, {tally.diverged} diverged, {tally.retries} retries; "
-        f"{run.url}"
+        f"mean badness {metrics['badness']:.2f}, {tally.diverged} diverged, {tally.stopped} stopped, "
+        f"{tally.retries} retries; {run.url}"
     )
     run.metrics(metrics, step=tally.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)

@@ -20,6 +20,7 @@ from svaedc import checkpoint, methods
 from svaedc.comparison import Trial
 from svaedc.statistics import Summary
 from workers.dataset.shards import sha256
+from workers.physics import ranges
 from workers.rollout import VERSION
 from workers.setups import Setup
 
@@ -99,7 +100,8 @@ def compare(
     """Run what is missing of a comparison, then summarise all of it.
 
     Raises:
-        UsageError: a method or gap level does not exist, or a method lacks its model.
+        UsageError: a method or gap level does not exist, a gap's range is impossible, or a method lacks its
+            model.
         UserError: the folder holds another comparison or cannot be written, the model is of another setup,
             runs kept failing, or MLflow lacks some of the results.
     """
@@ -129,15 +131,16 @@ def _plan(
     try:
         setup.gap(gap)
         with_model = [name for name in grid.methods if methods.needs_model(name)]
-    except LookupError as error:
+    except (LookupError, ValueError) as error:
         raise UsageError(error.args[0]) from error
     if with_model and model is None:
         raise UsageError(f"{', '.join(with_model)} need a trained model: name its folder with --model")
     path = _checkpoint(model, setup) if with_model and model else None
+    level = str(ranges(gap)) if "=" in gap else gap  # so that equal ranges are one comparison
     job = ComparisonJob(
         folder=folder.resolve(),
         setup=setup.name,
-        gap=gap,
+        gap=level,
         model=str(path.resolve()) if path else "",
         pool_size=settings.pool_size,
         initial=settings.initial_trials,
@@ -145,7 +148,7 @@ def _plan(
     )
     identity = {
         "setup": setup.name,
-        "gap": gap,
+        "gap": level,
         "pool_size": settings.pool_size,
         "initial_trials": settings.initial_trials,
         "rollout_version": VERSION,

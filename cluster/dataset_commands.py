@@ -69,6 +69,7 @@ def _described(found: Statistics) -> dict[str, str]:
         "badness": f"{found.badness:.3f} on average",
         "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
         "diverged": str(found.diverged),
+        "stopped": ", ".join(f"{count} {reason}" for reason, count in found.stopped.items()) or "0",
     }
 
 

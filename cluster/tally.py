@@ -20,6 +20,7 @@ class Tally:
     episodes: int = 0
     size: int = 0
     diverged: int = 0
+    stopped: int = 0
     bad: float = 0.0  # summed over episodes
     best: float = float("-inf")
     rollout_seconds: float = 0.0
@@ -33,6 +34,7 @@ class Tally:
         self.episodes += report.shard.episodes
         self.size += report.size
         self.diverged += report.diverged
+        self.stopped += report.stopped
         self.bad += report.badness * report.shard.episodes
         self.best = max(self.best, report.best)
         self.rollout_seconds += report.rollout_seconds
@@ -47,6 +49,7 @@ class Tally:
             "badness": self.bad / max(self.episodes, 1),
             "best_objective": self.best,
             "diverged": self.diverged,
+            "stopped": self.stopped,
             "bytes_per_episode": self.size / max(self.episodes, 1),
             "core_hours": (self.rollout_seconds + self.storage_seconds) / 3600,
             "storage_share": self.storage_seconds / max(self.rollout_seconds + self.storage_seconds, 1e-9),

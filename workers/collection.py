@@ -20,6 +20,7 @@ class ShardReport:
         shard: the range of episodes.
         badness: mean y.
         diverged: episodes whose simulation exploded.
+        stopped: episodes that a stop rule ended.
         best: highest f.
         size: bytes on disk.
         rollout_seconds: CPU time of this process in rollouts.
@@ -29,6 +30,7 @@ class ShardReport:
     shard: Shard
     badness: float
     diverged: int
+    stopped: int
     best: float
     size: int
     rollout_seconds: float
@@ -68,6 +70,7 @@ def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:
         shard=shard,
         badness=float(np.mean([episode.y for episode in episodes])),
         diverged=sum(episode.stop == DIVERGED for episode in episodes),
+        stopped=sum(episode.stop not in ("", DIVERGED) for episode in episodes),
         best=max(episode.f for episode in episodes),
         size=path.stat().st_size,
         rollout_seconds=rolled_out - begin,

@@ -9,7 +9,8 @@ from types import ModuleType
 
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
-from workers.physics import PhysicsRanges
+from workers.physics import PhysicsRanges, ranges
+from workers.tasks.stop import STOPPED, StopRule, never
 from workers.tasks.task import Task
 
 MODULES = {
@@ -19,6 +20,9 @@ MODULES = {
     "daisy-11d-rehearsal": "workers.environments.daisy_11d_rehearsal",
     "quadratic-30d": "workers.environments.quadratic_30d",
     "quadratic-30d-intrinsic-3": "workers.environments.quadratic_30d_intrinsic_3",
+    "franka-rehearsal": "workers.environments.franka_rehearsal",
+    "yumi": "workers.environments.yumi",
+    "yumi-rehearsal": "workers.environments.yumi_rehearsal",
 }
 """A new robot is one module that offers `setup()`, and one line here; none for a module of the user's own."""
 
@@ -39,6 +43,7 @@ class Setup:
         gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
         objective_limits: the range of f, fixed; BO scales f by it.
         success: an episode with f above this succeeded.
+        stop: ends an episode early; of stand-ins for hardware only.
     """
 
     name: str
@@ -52,6 +57,7 @@ class Setup:
     gaps: Mapping[str, PhysicsRanges]
     objective_limits: tuple[float, float]
     success: float
+    stop: StopRule = never
 
     @property
     def dimensions(self) -> int:
@@ -60,16 +66,33 @@ class Setup:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Names of the bad conditions, in the order of their bits."""
-        return self.task.conditions
+        """Names of the bad conditions, in the order of their bits; `stopped` comes last if it may be.
+
+        A graded G_bad has no bits: a stop gives its steps the degree 1.
+        """
+        bits = self.stop is not never and not self.task.graded
+        return (*self.task.conditions, STOPPED) if bits else self.task.conditions
 
     def open(self) -> Environment:
         """Start the simulated environment; close it, or use it in a `with` block."""
         return self.build()
 
     def gap(self, level: str) -> PhysicsRanges:
-        """Ranges of a sim-to-real gap level; an unknown one raises `LookupError` and names the nearest."""
-        return self.gaps[known(level, "gap level", self.gaps)]
+        """Ranges of a sim-to-real gap level, or those written out, such as `friction=1:2.5,restitution=0.05`.
+
+        Parameters that are not written out keep the middle of their range of data collection.
+
+        Raises:
+            LookupError: when there is no such level or no such parameter; the message names the nearest.
+            ValueError: when a range is not written as `workers.physics.ranges` reads it, or is impossible.
+        """
+        if "=" not in level:
+            return self.gaps[known(level, "gap level", self.gaps)]
+        fixed = {name: ((low + high) / 2,) * 2 for name, (low, high) in self.physics.intervals.items()}
+        written = ranges(level).intervals
+        for name in written:
+            known(name, "physics parameter", fixed)
+        return PhysicsRanges({**fixed, **written})
 
 
 def known(name: str, kind: str, names: Mapping[str, object]) -> str:

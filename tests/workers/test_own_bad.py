@@ -1,5 +1,6 @@
 """G_bad supplied by users: stored as they say, never mixed, and refused with a reason when it is wrong."""
 
+import itertools
 import json
 import sys
 from dataclasses import replace
@@ -194,9 +195,9 @@ def test_a_module_that_is_no_python_is_refused_with_the_place(franka, module):
         with_bad(franka, "broken:rough")
 
 
-def test_a_function_has_one_to_eight_conditions():
-    with pytest.raises(ValueError, match="1 to 8 conditions, one bit each, got 9"):
-        conditions(*"abcdefghi")
+def test_a_function_has_one_to_seven_conditions():
+    with pytest.raises(ValueError, match="1 to 7 conditions, got 8"):
+        conditions(*"abcdefgh")
     with pytest.raises(ValueError, match="got 0"):
         conditions()
 
@@ -289,6 +290,18 @@ def test_an_episode_that_diverges_is_entirely_bad(franka):
     assert diverged.bad.tolist() == np.ones(60, np.float32).tolist()
     assert diverged.bad.dtype == np.float32
     assert diverged.y == 1.0
+
+
+def test_steps_that_a_stop_rule_spared_have_the_degree_one(franka, environment, episode):
+    calls = itertools.count(1)
+    stopping = replace(with_bad(franka, "gentle:rough"), stop=lambda _: "tired" if next(calls) == 20 else "")
+    stopped, whole = random_episode(stopping, environment, 0, 1), episode("rough")
+    assert stopped.stop == "tired"
+    assert np.array_equal(stopped.bad[:19], whole.bad[:19])
+    assert stopped.bad[19:].tolist() == [1.0] * 41
+    assert stopped.y == pytest.approx((whole.bad[:19].sum(dtype=np.float64) + 41) / 60)
+    assert stopped.f == np.float32(franka.objective_limits[0])
+    assert stopping.conditions == ("rough",)
 
 
 def test_gymnasium_reports_the_degree_of_a_step(franka):

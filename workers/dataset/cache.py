@@ -15,6 +15,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns, degree
+from workers.rollout import DIVERGED
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
@@ -24,7 +25,9 @@ Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
 
 @dataclass(frozen=True)
 class TrainingCache:
-    """Memory-mapped arrays of N episodes and S = T // stride samples; diverged episodes are left out.
+    """Memory-mapped arrays of N episodes and S = T // stride samples.
+
+    Diverged episodes are left out; those that a stop rule ended are not.
 
     Attributes:
         repeats: consecutive episodes that share a controller.
@@ -157,7 +160,7 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
 
 
 def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
-    sane = np.array([stop == "" for stop in columns.stop])
+    sane = np.array([stop != DIVERGED for stop in columns.stop])
     last = slice(stride - 1, samples * stride, stride)
     return {
         "episode": columns.episode[sane],

@@ -12,6 +12,7 @@ from workers.dataset.identity import Identity
 from workers.dataset.publication import link, synchronise, temporary_file
 from workers.dataset.schema import Columns, read, read_stops
 from workers.dataset.shards import Shard
+from workers.rollout import DIVERGED
 
 MANIFEST = "dataset.json"
 
@@ -48,8 +49,9 @@ class Dataset:
         return sum(shard.episodes for shard in self.shards())
 
     def sane_episodes(self) -> int:
-        """How many of them ran to their end; the rest diverged."""
-        return sum(read_stops(self.path(shard)).count("") for shard in self.shards())
+        """How many of them a model may learn from: all but the diverged ones."""
+        diverged = sum(read_stops(self.path(shard)).count(DIVERGED) for shard in self.shards())
+        return self.episodes() - diverged
 
     def size(self) -> int:
         """Bytes of the finished shards."""

@@ -1,5 +1,6 @@
 """What the episodes of a dataset are like: objective, badness, and how often each condition is bad."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
 from workers.dataset.schema import Bad, read_outcomes
+from workers.rollout import DIVERGED
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """The quantiles that describe the objective."""
@@ -22,12 +24,14 @@ class Statistics:
         badness: mean y, in [0, 1].
         bad_steps: the share of steps in which each condition was bad, or the mean degree, by its name.
         diverged: how many episodes diverged.
+        stopped: how many episodes a stop rule ended, by its reason, in the order of the alphabet.
     """
 
     objective: Float64[np.ndarray, " marks"]
     badness: float
     bad_steps: Mapping[str, float]
     diverged: int
+    stopped: Mapping[str, int]
 
 
 def statistics(dataset: Dataset) -> Statistics:
@@ -36,13 +40,13 @@ def statistics(dataset: Dataset) -> Statistics:
     Raises:
         ValueError: the dataset has no episodes, or a damaged file.
     """
-    objectives, badness, diverged, steps = [], 0.0, 0, 0
+    objectives, badness, steps, stops = [], 0.0, 0, Counter[str]()
     bad = np.zeros(len(dataset.identity.conditions))
     for shard in dataset.shards():
         outcomes = read_outcomes(dataset.path(shard), dataset.identity)
         objectives.append(outcomes.f)
         badness += float(outcomes.y.sum(dtype=np.float64))
-        diverged += sum(stop != "" for stop in outcomes.stop)
+        stops.update(outcomes.stop)
         bad += _total(outcomes.bad, len(bad))
         steps += outcomes.bad.size
     if not objectives:
@@ -52,7 +56,8 @@ def statistics(dataset: Dataset) -> Statistics:
         objective=np.quantile(f, MARKS),
         badness=badness / len(f),
         bad_steps=dict(zip(dataset.identity.conditions, (bad / steps).tolist(), strict=True)),
-        diverged=diverged,
+        diverged=stops[DIVERGED],
+        stopped={reason: stops[reason] for reason in sorted(stops.keys() - {"", DIVERGED})},
     )
 
 

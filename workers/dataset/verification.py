@@ -13,6 +13,8 @@ from workers.dataset.schema import Columns, degree, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
+from workers.rollout import DIVERGED
+from workers.tasks.stop import STOPPED
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,24 @@ def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
         yield f"its rows are not the episodes {shard.start} to {shard.stop - 1}"
 
 
+def _stop_problems(columns: Columns, identity: Identity) -> Iterator[str]:
+    """Diverged episodes are bad throughout, stopped ones from the step of the reason on, others never."""
+    reasons = np.array(columns.stop)
+    diverged = reasons == DIVERGED
+    if not np.all(columns.bad[diverged]):
+        yield "a diverged episode has steps that are not bad"
+    if identity.bad_kind == "graded":
+        if np.any(columns.bad[~diverged & (reasons != ""), -1] != 1.0):
+            yield "a stopped episode ends with a step that is not bad"
+        return
+    bit = 1 << identity.conditions.index(STOPPED) if STOPPED in identity.conditions else 0
+    stopped = (columns.bad[~diverged] & bit) != 0
+    if not np.array_equal(stopped[:, -1], reasons[~diverged] != ""):
+        yield f"its stop reasons do not fit the condition {STOPPED!r} of the last steps"
+    if np.any(stopped[:, :-1] > stopped[:, 1:]):
+        yield "an episode goes on after it was stopped"
+
+
 def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     if not all(np.isfinite(values).all() for values in (columns.x, columns.xi, columns.y, columns.f)):
         yield "it holds numbers that are not finite"
@@ -82,6 +102,7 @@ def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
         yield "it holds degrees of badness outside [0, 1]"
     if not np.allclose(columns.y, degree(columns.bad).mean(axis=1, dtype=np.float64), atol=1e-6):
         yield "y is not the mean of the bad steps"
+    yield from _stop_problems(columns, identity)
     drawn = columns.episode // identity.repeats
     controllers = (generator(identity.seed, "controller", int(index)) for index in drawn)
     width = columns.x.shape[1]

@@ -73,7 +73,7 @@ class Hexapod:
         self.drive = self._drive_freely if math.isinf(model.speeds[0]) else self._drive_slowly
 
     def _load(self, urdf: str) -> int:
-        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
         with NamedTemporaryFile("w", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()

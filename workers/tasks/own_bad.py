@@ -30,9 +30,9 @@ _MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError,
 
 
 def conditions(*names: str) -> Callable[[_Marked], _Marked]:
-    """Marks a function that returns one row of booleans per condition; 1 to 8 names, in the rows' order."""
-    if not 1 <= len(names) <= 8:
-        raise ValueError(f"a function has 1 to 8 conditions, one bit each, got {len(names)}: {names}")
+    """Marks a function that returns one row of booleans per condition; 1 to 7 names, in the rows' order."""
+    if not 1 <= len(names) <= 7:
+        raise ValueError(f"a function has 1 to 7 conditions, got {len(names)}: {names}")
 
     def mark(function: _Marked) -> _Marked:
         setattr(function, _NAMES, names)
@@ -80,6 +80,10 @@ class OwnBad(Task):
     def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
         """The task's own, with its own bad steps."""
         return self.task.objective(observed, self.task.is_bad(observed))
+
+    def stopped_objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
+        """The task's own, with its own bad steps."""
+        return self.task.stopped_objective(observed, self.task.is_bad(observed))
 
     def _degrees(self, values: np.ndarray, steps: int) -> Float32[np.ndarray, "1 time"]:
         if values.dtype.kind not in "bfiu" or values.shape != (steps,):

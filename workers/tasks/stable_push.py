@@ -70,6 +70,10 @@ class StablePush(Task):
             total += -y_max if fallen else self.direction * (float(last[1, 0]) - y_start)
         return total
 
+    def stopped_objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
+        """−y_max for every object, as if it had fallen (section 7 of the paper: −2 y_max)."""
+        return self.objective_limits[0]
+
     def _object(self, observed: Observed, number: int) -> Float32[np.ndarray, "9 time"]:
         begin = self.channel + 9 * number
         return observed.xi[begin : begin + 9]

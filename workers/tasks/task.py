@@ -15,7 +15,8 @@ class Task(ABC):
     """Bad conditions and an objective over the T steps of an episode.
 
     Class attributes of a concrete task:
-        conditions: names of the bad conditions, at most 8 (one bit each in the dataset).
+        conditions: names of the bad conditions, at most 7, for a step has 8 bits in the dataset and one
+            may be `stopped`.
         graded: whether G_bad is one row of degrees instead of one row of booleans per condition.
         bad_name: how a user's G_bad is imported; "" for the task's own.
         bad_digest: SHA-256 of the file that defines it; "" for the task's own.
@@ -33,3 +34,7 @@ class Task(ABC):
     @abstractmethod
     def objective(self, observed: Observed, bad: Bad) -> float:
         """f, the number Bayesian optimisation maximises."""
+
+    def stopped_objective(self, observed: Observed, bad: Bad) -> float:
+        """The objective of an episode that a stop rule ended: f of the steps it ran, which are `observed`."""
+        return self.objective(observed, bad)
