@@ -94,17 +94,23 @@ def collect(
     config: Config = None,
     overrides: Overrides = None,
     address: Address = None,
+    *,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Collect a few shards, and say what all of it will cost.")
+    ] = False,
 ) -> None:
     """Roll out random controllers on a pool of Ray actors into Parquet shards.
 
     What the folder holds already is kept: run the same command again after an interruption, or ask for more
-    episodes to extend the dataset.
+    episodes to extend the dataset. With --plan, only the first shards are collected, and what all of them
+    will cost is told from those.
     """
     from cluster.collect import collect as run_collect
+    from cluster.collect import foretell
 
     settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
     with _services(settings, address) as (session, tracker):
-        run_collect(
+        (foretell if plan else run_collect)(
             setup=chosen,
             episodes=episodes,
             folder=dataset,

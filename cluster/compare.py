@@ -18,7 +18,7 @@ from cluster.session import Session
 from cluster.tracking import Run, Tracker
 from svaedc import checkpoint, methods
 from svaedc.comparison import Trial
-from svaedc.statistics import Summary
+from svaedc.summaries import Summary
 from workers.dataset.shards import sha256
 from workers.physics import ranges
 from workers.rollout import VERSION

@@ -16,6 +16,7 @@ from cluster.results import RunKey, append, recorded
 from svaedc import checkpoint, methods
 from svaedc.candidates import Problem
 from svaedc.comparison import Outcome, Trial, trials
+from svaedc.densities import Densities
 from svaedc.features import Latents
 from svaedc.model import SvaeDc
 from workers import setups
@@ -73,10 +74,11 @@ class ComparisonJob:
 
     def _problem(self, key: RunKey, setup: Setup) -> Problem:
         pool = generator(key.run, "pool", 0).random((self.pool_size, setup.dimensions), dtype=np.float32)
-        latents = None
-        if methods.needs_model(key.method):
-            latents = Latents.of(torch.from_numpy(pool), _model(self.model).latent_means)
-        return Problem(setup.dimensions, setup.objective_limits, pool, latents)
+        if not methods.needs_model(key.method):
+            return Problem(setup.dimensions, setup.objective_limits, pool)
+        model = _model(self.model)
+        latents = Latents.of(torch.from_numpy(pool), model.latent_means)
+        return Problem(setup.dimensions, setup.objective_limits, pool, latents, Densities.of(model))
 
 
 def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:

@@ -10,7 +10,8 @@ from cluster.comparison_folder import writing
 from cluster.comparison_job import ComparisonJob
 from cluster.files import replacing
 from cluster.results import Runs, rows, write_table
-from svaedc.statistics import Reporting, Summary, summarise
+from svaedc.statistics import summarise
+from svaedc.summaries import Reporting, Summary
 from workers.randomness import generator
 from workers.setups import Setup
 

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+)
 
 from cluster.errors import UsageError, nearest
 
@@ -59,11 +68,20 @@ class CollectSettings(Section):
         return max(1, cpus) if self.actors == "all" else self.actors
 
 
+CHANGEABLE = (
+    *("model", "latent", "distribution", "head"),
+    *("weighting", "kl_weight", "learning_rate", "patience"),
+)
+"""Settings of training that belong to the preset unless they are given."""
+
+
 class TrainSettings(Section):
     """`svaedc train`: where and for how long; what is trained is the preset's business."""
 
     workers: PositiveInt = 1
     """Data-parallel training processes."""
+    least_workers: PositiveInt | Literal["all"] = "all"
+    """With fewer than `workers`, training starts and goes on with as many as there is room for."""
     threads: PositiveInt | Literal["all"] = "all"
     """Of each process, one CPU each; `all` shares the free CPUs among the processes, each on one machine."""
     updates: PositiveInt | Literal["preset"] = "preset"
@@ -76,6 +94,32 @@ class TrainSettings(Section):
     """Where shards are decoded into one memory-mapped array, once per dataset."""
     checkpoint_every_epochs: PositiveInt = 1
     """Epochs that an interruption may cost."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """`auto` takes a GPU for each process where the cluster has any; `cuda` refuses to do without."""
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """Of matrix products; `auto` is bfloat16 on a GPU that has it, and float32 elsewhere."""
+    balance: Literal["none", "y", "f"] = "none"
+    """Show episodes of every tenth of the range of y or f equally often; for skewed data."""
+    model: Literal["preset", "svae-dc", "svae"] = "preset"
+    """`svae` knows nothing of badness."""
+    latent: Literal["preset", "3x3", "5x6", "15x12"] = "preset"
+    """Steps of the latent path x dimensions of each, with the hidden sizes the paper gives them."""
+    distribution: Literal["preset", "laplace", "gaussian"] = "preset"
+    """Family of all four distributions."""
+    head: Literal["preset", "low-rank", "dense"] = "preset"
+    """Output of p(xi|tau)."""
+    weighting: Literal["preset", "paper", "balanced"] = "preset"
+    """Weights of the bound's terms: the paper's equation, or one that keeps psi alive."""
+    kl_weight: NonNegativeFloat | Literal["preset"] = "preset"
+    """Of the KL term; 1 is the paper's equation."""
+    learning_rate: PositiveFloat | Literal["preset"] = "preset"
+    """Of the first update of the joint stage."""
+    patience: PositiveInt | Literal["preset"] = "preset"
+    """Epochs (250 updates) without a better held-out loss after which a stage ends early."""
+
+    def changes(self) -> dict[str, str | float | int]:
+        """What is changed of the preset, by name."""
+        return {name: getattr(self, name) for name in CHANGEABLE if getattr(self, name) != "preset"}
 
 
 class CompareSettings(Section):

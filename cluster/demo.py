@@ -13,7 +13,7 @@ from cluster.progress import say, timed
 from cluster.session import Session
 from cluster.tracking import Tracker
 from cluster.train import MINIMUM_EPISODES, train
-from svaedc.statistics import Difference
+from svaedc.summaries import Difference
 from workers import setups
 
 SETUP = "franka"

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from cluster.files import replacing
 from svaedc.episodes import Episodes
 from svaedc.model import SvaeDc
-from svaedc.statistics import MethodSummary, Summary
+from svaedc.summaries import MethodSummary, Summary
 from workers.dataset.identity import Identity
 
 mpl.rcParams.update(

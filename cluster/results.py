@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from cluster.errors import UserError
 from cluster.files import replacing
 from svaedc.comparison import Trial
-from svaedc.statistics import Row
+from svaedc.summaries import Row
 
 RUNS = "runs"
 TABLE = "trials.parquet"

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
 from jaxtyping import Float, Float32, Int
 from torch import Tensor
 
+from svaedc.densities import Densities, Density
 from svaedc.features import Embedding, Latents
 from svaedc.history import History
 
@@ -23,12 +25,16 @@ class Problem:
         pool: Random controllers in the unit cube, fresh per run; may be empty ([0, D]) where no method needs
             one.
         latents: What the frozen model says of the pool, for methods that need it.
+        densities: Its distributions, for the KL kernels.
+        largest_y: Controllers predicted worse than this are out of bounds.
     """
 
     dimensions: int
     objective_limits: tuple[float, float]
     pool: Float32[np.ndarray, "n D"]
     latents: Latents | None = None
+    densities: Densities | None = None
+    largest_y: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuses parts that do not belong together."""
@@ -57,12 +63,25 @@ class Problem:
             )
         return self.latents
 
+    def known_densities(self) -> Densities:
+        """The distributions.
+
+        Raises:
+            ValueError: There are none.
+        """
+        if self.densities is None:
+            raise ValueError(
+                "densities must be those of a trained model, got None: train one and pass Densities.of(model)"
+            )
+        return self.densities
+
     def least_bad(self, share: float) -> "Problem":
         """The same problem with only this share of the pool, the controllers predicted least bad."""
         latents = self.known_latents()
         kept = torch.argsort(latents.y, stable=True)[: math.ceil(share * len(self.pool))]
         screened = replace(latents, tau=latents.tau[kept], y=latents.y[kept])
-        return replace(self, pool=self.pool[kept.numpy()], latents=screened)
+        largest_y = float(screened.y.max()) if len(kept) else 0.0
+        return replace(self, pool=self.pool[kept.numpy()], latents=screened, largest_y=largest_y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,32 +94,48 @@ class Candidates:
     Attributes:
         x: The controllers.
         phi: Their features divided by `unit`, float64.
-        embed: Features of any controllers (float64, [n, D]), not yet divided.
+        embed: Features of any controllers (float64, [n, D]), not yet divided; gradients reach them.
         unit: Root-mean-square distance between the features of two candidates.
+        excess: How much worse than allowed any controllers are predicted; 0 where nothing is forbidden.
+        low: Smallest value of each controller parameter that a search off the pool may try.
+        high: Largest value.
     """
 
     x: Float32[np.ndarray, "n D"]
     phi: Float[Tensor, "n k"]
     embed: Callable[[Tensor], Tensor]
     unit: float
+    excess: Callable[[Tensor], Tensor]
+    low: Float[Tensor, " D"]
+    high: Float[Tensor, " D"]
 
     @classmethod
-    def of(
-        cls, x: Float32[np.ndarray, "n D"], phi: Float[Tensor, "n k"], embed: Callable[[Tensor], Tensor]
-    ) -> "Candidates":
-        """Candidates with these features.
+    def of(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
+        """The pool with the features `embed` gives it, in units of their typical distance."""
+        raw = cls.unscaled(problem, embed)
+        unit = math.sqrt(2 * float(raw.phi.var(dim=0, correction=0).sum())) if len(raw.x) else 1.0
+        return raw.in_units_of(unit or 1.0)
 
-        Raises:
-            ValueError: There are none.
-        """
-        if not len(x):
-            raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
-        unit = math.sqrt(2 * float(phi.var(dim=0, correction=0).sum())) or 1.0
-        return cls(x, phi / unit, embed, unit)
+    @classmethod
+    def unscaled(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
+        """The pool with the features `embed` gives it, as they are."""
+        with torch.no_grad():
+            phi = embed(torch.tensor(problem.pool).double())
+        low = torch.zeros(problem.dimensions).double()
+        return cls(problem.pool, phi, embed, 1.0, partial(_excess, problem), low, low + 1)
 
-    def features_of(self, x: Float[np.ndarray, "t D"]) -> Float[Tensor, "t k"]:
-        """Features of any controllers, in the same unit."""
-        return self.embed(torch.tensor(x)) / self.unit
+    def in_units_of(self, unit: float) -> "Candidates":
+        """The same candidates with features divided by this."""
+        return replace(self, phi=self.phi / unit, unit=unit)
+
+    def within(self, low: Float[Tensor, " D"], high: Float[Tensor, " D"]) -> "Candidates":
+        """As many candidates in a box: these, squeezed into it."""
+        x = (low + (high - low) * torch.tensor(self.x)).float()
+        return replace(self, x=x.numpy(), phi=self.features_of(x.double()), low=low, high=high)
+
+    def features_of(self, x: Float[Tensor, "t D"]) -> Float[Tensor, "t k"]:
+        """Features of any controllers, in the same unit; gradients reach them."""
+        return self.embed(x) / self.unit
 
     def untried(self, history: History) -> Int[np.ndarray, " u"]:
         """Indices of the candidates no trial was spent on.
@@ -108,6 +143,8 @@ class Candidates:
         Raises:
             ValueError: There are none left.
         """
+        if not len(self.x):
+            raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
         tried = np.zeros(len(self.x), dtype=bool)
         for x in history.tried.astype(np.float32):
             tried |= (self.x == x).all(axis=1)
@@ -118,11 +155,30 @@ class Candidates:
 
 def as_they_are(problem: Problem) -> Candidates:
     """The pool, compared by controller parameters: phi(x) = x."""
-    return Candidates.of(problem.pool, torch.tensor(problem.pool).double(), lambda x: x)
+    return Candidates.of(problem, _identity)
+
+
+def in_the_cube(problem: Problem) -> Candidates:
+    """The pool, compared by controller parameters in the unit cube, as packaged methods expect them."""
+    return Candidates.unscaled(problem, _identity)
 
 
 def by_latents(problem: Problem, embedding: Embedding) -> Candidates:
     """The pool, compared by latent paths: phi(x) = embedding(tau of x, y of x)."""
     latents = problem.known_latents()
-    phi = embedding(latents.tau, latents.y)
-    return Candidates.of(problem.pool, phi, lambda x: embedding(*latents.means(x)))
+    return Candidates.of(problem, lambda x: embedding(*latents.means(x)))
+
+
+def by_density(problem: Problem, density: Density) -> Candidates:
+    """The pool, compared by distributions, whose divergence has no unit: phi(x) = [location | log scale]."""
+    return Candidates.unscaled(problem, density.rows)
+
+
+def _identity(x: Tensor) -> Tensor:
+    return x
+
+
+def _excess(problem: Problem, x: Tensor) -> Tensor:
+    if problem.largest_y >= 1:
+        return torch.zeros_like(x[:, 0])
+    return (problem.known_latents().means(x)[1] - problem.largest_y).clamp_min(0)

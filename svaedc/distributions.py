@@ -36,10 +36,23 @@ class Diagonal(ABC):
         """One reparameterised draw of each element from torch's current random generator."""
         return self.loc + self.scale * self._standard_noise()
 
+    def quantile(self, u: Float[Tensor, "*event"]) -> Float[Tensor, "batch *event"]:
+        """Value below which each element lies with its probability u in (0, 1), the same u for every row."""
+        return self.loc + self.scale * self._standard_quantile(u)
+
     @property
     @abstractmethod
     def variance(self) -> Float[Tensor, "batch *event"]:
         """Variance of each element."""
+
+    def entropy(self) -> Float[Tensor, " batch"]:
+        """-E[log q] of each row in closed form, summed over the event."""
+        return summed_over_event(self.scale.log() + self._standard_entropy)
+
+    @property
+    @abstractmethod
+    def _standard_entropy(self) -> float:
+        """Entropy of one element of the standard distribution."""
 
     @abstractmethod
     def _log_density(self, standardised: Tensor) -> Tensor:
@@ -48,6 +61,10 @@ class Diagonal(ABC):
     @abstractmethod
     def _standard_noise(self) -> Tensor:
         """Draw from the standard distribution, shaped like `loc`."""
+
+    @abstractmethod
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        """Quantile of the standard distribution."""
 
     @abstractmethod
     def _kl_elements(self, p: "Diagonal") -> Tensor:
@@ -64,6 +81,10 @@ class DiagonalLaplace(Diagonal):
         """Variance of each element, 2 b^2."""
         return 2.0 * self.scale.square()
 
+    @property
+    def _standard_entropy(self) -> float:
+        return 1.0 + math.log(2.0)
+
     def _log_density(self, standardised: Tensor) -> Tensor:
         return -standardised.abs() - math.log(2.0)
 
@@ -71,6 +92,9 @@ class DiagonalLaplace(Diagonal):
         # The interval is open at -1: log1p(-1) would be an infinite sample.
         u = torch.empty_like(self.loc).uniform_(torch.finfo(self.loc.dtype).eps - 1.0, 1.0)
         return -u.sign() * torch.log1p(-u.abs())
+
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        return -(u - 0.5).sign() * torch.log1p(-2.0 * (u - 0.5).abs())
 
     def _kl_elements(self, p: "Diagonal") -> Tensor:
         distance = (self.loc - p.loc).abs()
@@ -88,11 +112,18 @@ class DiagonalGaussian(Diagonal):
         """Variance of each element, sigma^2."""
         return self.scale.square()
 
+    @property
+    def _standard_entropy(self) -> float:
+        return 0.5 * math.log(2.0 * math.pi * math.e)
+
     def _log_density(self, standardised: Tensor) -> Tensor:
         return -0.5 * standardised.square() - 0.5 * math.log(2.0 * math.pi)
 
     def _standard_noise(self) -> Tensor:
         return torch.randn_like(self.loc)
+
+    def _standard_quantile(self, u: Tensor) -> Tensor:
+        return torch.special.ndtri(u)
 
     def _kl_elements(self, p: "Diagonal") -> Tensor:
         ratio = self.scale / p.scale
@@ -124,6 +155,11 @@ def kl_divergence(q: Diagonal, p: Diagonal) -> Float[Tensor, " batch"]:
 def summed_over_event(elements: Float[Tensor, "batch *event"]) -> Float[Tensor, " batch"]:
     """Sum of everything but the batch dimension; a batch of scalars stays as it is."""
     return elements.reshape(elements.shape[0], -1).sum(-1)
+
+
+def full_precision(values: Float[Tensor, "*shape"]) -> Float[Tensor, "*shape"]:
+    """Float32 of what mixed precision computed in fewer bits: densities and their sums need them all."""
+    return values.float() if values.dtype.itemsize < 4 else values
 
 
 def bounded_scale(raw: Float[Tensor, "*shape"], floor: float, cap: float) -> Float[Tensor, "*shape"]:

@@ -7,10 +7,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-Tau = Float[Tensor, "n k"]
-Y = Float[Tensor, " n"]
-LatentMeans = Callable[[Float[Tensor, "n D"]], tuple[Tensor, Tensor]]
-Embedding = Callable[[Tau, Y], Tau]
+LatentMeans = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""E[tau | x] and the predicted badness of controllers [n, D]."""
+Embedding = Callable[[Tensor, Tensor], Tensor]
+"""phi(x) of tau [..., k] and y [...]."""
 
 _LEAST_SCALE = 0.1
 """A latent dimension is collapsed below this share of the widest one (SPEC: active dimensions); whitening
@@ -41,29 +41,53 @@ class Latents:
     @classmethod
     def of(cls, pool: Float[Tensor, "n D"], at: LatentMeans) -> "Latents":
         """The latents of a pool: the one time the network sees it."""
-        tau, y = _frozen(at, pool)
-        return cls(tau, y, at)
+        with torch.no_grad():
+            return cls(*_means(at, pool), at)
 
     def means(self, x: Float[Tensor, "n D"]) -> tuple[Float[Tensor, "n k"], Float[Tensor, " n"]]:
-        """E[tau | x] and the predicted badness of any controllers, in float64, without gradients."""
-        return _frozen(self.at, x)
+        """E[tau | x] and the predicted badness of any controllers, in float64; gradients reach x."""
+        return _means(self.at, x)
 
 
-def _frozen(at: LatentMeans, x: Float[Tensor, "n D"]) -> tuple[Tensor, Tensor]:
-    with torch.no_grad():
-        tau, y = at(x.float())
+def _means(at: LatentMeans, x: Float[Tensor, "n D"]) -> tuple[Tensor, Tensor]:
+    tau, y = at(x.float())
     # The mean of p(y|psi) may overshoot [0, 1], and a negative 1 - y would mirror latent paths.
     return tau.double(), y.double().clamp(0, 1)
 
 
-def svae(tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:  # noqa: ARG001
+def svae(tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:  # noqa: ARG001
     r"""phi(x) = \bar\tau_x: the latent path as it is, whatever its badness."""
     return tau
 
 
-def svae_dc(tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:
+def svae_dc(tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:
     r"""phi(x) = (1 - \bar y_x) \bar\tau_x: dynamic compression, equation (k_svae_dc_dist)."""
-    return (1 - y)[:, None] * tau
+    return (1 - y).unsqueeze(-1) * tau
+
+
+@dataclass(frozen=True)
+class Sigmoid:
+    r"""phi(x) = sigmoid(\alpha((1 - \bar y_x) - c)) \bar\tau_x: non-linear compression (section 4).
+
+    The paper prints sigmoid(alpha(y - c)), which would enlarge what is bad; the authors' code compresses by
+    the goodness 1 - y, and so does this. Their constants are the defaults.
+
+    Attributes:
+        alpha: Slope.
+        c: Goodness at the midpoint.
+    """
+
+    alpha: float = 25.0
+    c: float = 0.35
+
+    def __post_init__(self) -> None:
+        """Refuses a slope that would enlarge what is bad."""
+        if not self.alpha > 0:
+            raise ValueError(f"alpha must be above 0, got {self.alpha}: a falling slope rewards badness")
+
+    def __call__(self, tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:
+        """The features of any controllers."""
+        return torch.sigmoid(self.alpha * ((1 - y) - self.c)).unsqueeze(-1) * tau
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +115,8 @@ class Whitened:
         s = spread.clamp_min(max(_LEAST_SCALE * float(spread.max()), torch.finfo(tau.dtype).tiny))
         return cls(s, worst=float(y.max()), best=float(y.min()))
 
-    def __call__(self, tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> Float[Tensor, "n k"]:
+    def __call__(self, tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:
         """The features of any controllers; beyond the worst and the best simulated one, g stays 0 and 1."""
         range_of_y = max(self.worst - self.best, torch.finfo(tau.dtype).tiny)
         g = ((self.worst - y) / range_of_y).clamp(0, 1)
-        return g[:, None] * tau / self.s
+        return g.unsqueeze(-1) * tau / self.s

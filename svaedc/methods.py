@@ -1,23 +1,22 @@
 """How the next controller is suggested: the competitors of a comparison, by name."""
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from gpytorch.kernels import Kernel
 from jaxtyping import Float32
+from torch import Tensor
 
-from svaedc import bo, kernels
-from svaedc.candidates import Candidates, Problem, as_they_are, by_latents
-from svaedc.features import Embedding, Whitened, svae, svae_dc
+from svaedc.acquisitions import Acquisition, log_ei, ucb
+from svaedc.beliefs import BELIEFS, BELIEFS_OF_A_MODEL, LEAST_BAD, Belief
+from svaedc.candidates import Candidates, Problem, as_they_are
 from svaedc.history import History
-
-LEAST_BAD = 0.3
-"""Share of the pool that screening keeps."""
+from svaedc.search import ByGradient, OverPool, Search, Value, torch_randomness
+from svaedc.surrogates import Process, Surrogate
+from svaedc.trust_region import TrustRegion
 
 
 @runtime_checkable
@@ -48,57 +47,100 @@ class PoolSearch:
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
         """A uniform draw from the candidates no trial was spent on."""
-        return self.candidates.x[rng.choice(self.candidates.untried(history))].copy()
+        return OverPool().anywhere(self.candidates, history, rng)
 
 
 @dataclass(frozen=True)
-class PoolOptimisation:
-    """Bayesian optimisation: UCB of a Gaussian process on features, maximised over the candidates.
+class Optimisation:
+    """Bayesian optimisation.
 
     Attributes:
-        candidates: What may be suggested, and the features the kernel compares.
-        kernel: Makes the kernel on the features, with its starting hyper-parameters.
-        objective_limits: Objectives that count as 0 and 1.
+        belief: What the trials teach about all controllers.
+        acquisition: What makes a controller promising.
+        search: Where the most promising one is sought.
     """
 
-    candidates: Candidates
-    kernel: Callable[[], Kernel]
-    objective_limits: tuple[float, float]
+    belief: Belief
+    acquisition: Acquisition
+    search: Search
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """The untried candidate of largest UCB; before the first measurement, any."""
+        """The controller of largest acquisition; before the first measurement, any."""
+        candidates = self.belief.candidates
         if not len(history):
-            return PoolSearch(self.candidates).suggest(history, rng)
-        untried = self.candidates.untried(history)
-        f = bo.scaled(torch.tensor(history.f), self.objective_limits)
-        surrogate = bo.fit(self.kernel, self.candidates.features_of(history.x), f)
-        best = bo.ucb(surrogate.model, self.candidates.phi[untried]).argmax()
-        return self.candidates.x[untried[best]].copy()
+            return self.search.anywhere(candidates, history, rng)
+        with torch_randomness(rng):
+            surrogate, best = self.belief.after(history)
+        return self.search.maximise(_value(surrogate, self.acquisition, best), candidates, history, rng)
 
 
 @dataclass(frozen=True)
-class BotorchDefault:
-    """What a practitioner writes today: BoTorch's default process and log expected improvement."""
+class TrustRegionOptimisation:
+    """TuRBO-1: Bayesian optimisation in a box around the best controller, which follows from the history."""
 
-    dimensions: int
+    belief: Belief
+    acquisition: Acquisition
+    search: Search
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """The maximum of log expected improvement; before the first measurement, a uniform draw."""
-        if not len(history):
-            return UniformSearch(self.dimensions).suggest(history, rng)
-        with bo.torch_randomness(rng):
-            best = bo.maximise_log_ei(torch.tensor(history.x), torch.tensor(history.f))
-        x = best.numpy().astype(np.float32)
-        # The process learns nothing from a failed trial and would ask for the same one for ever.
-        return UniformSearch(self.dimensions).suggest(history, rng) if history.has_failed(x) else x
+        """The controller of largest acquisition in the box; where a box begins, any."""
+        region = TrustRegion.after(history.f.tolist(), history.x.shape[1])
+        if region.begins:
+            return self.search.anywhere(self.belief.candidates, history, rng)
+        recent = History(history.x[region.first :], history.f[region.first :], history.failed)
+        with torch_randomness(rng):
+            surrogate, best = self.belief.after(recent)
+        centre = torch.tensor(recent.x[recent.f.argmax()])
+        box = self.belief.candidates.within(*region.box(centre, _lengthscales(surrogate)))
+        return self.search.maximise(_value(surrogate, self.acquisition, best), box, history, rng)
 
 
-KernelOf = Callable[[int], Kernel]
+_SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
+_ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
+_OURS, _PRACTITIONERS = ("pool", "ucb"), ("acqf", "ei")
+_DEFAULTS: Final = {name: _OURS for name in BELIEFS | BELIEFS_OF_A_MODEL} | {
+    name: _PRACTITIONERS for name in ("botorch", "saasbo", "turbo")
+}
+_RANDOM: Final[dict[str, Callable[[Problem], Method]]] = {
+    "random": lambda problem: UniformSearch(problem.dimensions),
+    "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),
+}
+_NAMED_VARIANTS: Final = ("se-acqf", "matern-acqf")
+
+
+@dataclass(frozen=True)
+class _Name:
+    """A method's name, read: `svae-dc-acqf-ei` is `svae-dc` by gradients with expected improvement."""
+
+    base: str
+    search: str
+    acquisition: str
+
+    @classmethod
+    def read(cls, name: str) -> "_Name":
+        """The parts of a name; what it leaves out is the default of its method.
+
+        Raises:
+            LookupError: No method has this name, or it has a shorter one.
+        """
+        base, acquisition = _without_suffix(name, _ACQUISITIONS)
+        base, search = _without_suffix(base, _SEARCHES)
+        if name in _RANDOM:
+            return cls(name, "", "")
+        if base not in _DEFAULTS:
+            raise LookupError(_unknown(name))
+        usual_search, usual_acquisition = _DEFAULTS[base]
+        if search == usual_search or acquisition == usual_acquisition:
+            raise LookupError(
+                f"method must not repeat what {base!r} does anyway ({usual_search}, {usual_acquisition}), "
+                f"got {name!r}: leave that part out"
+            )
+        return cls(base, search or usual_search, acquisition or usual_acquisition)
 
 
 def names() -> tuple[str, ...]:
-    """Every method `build` knows."""
-    return tuple(sorted(_RECIPES | _RECIPES_WITH_MODEL))
+    """The methods of the comparison. Most also take `-pool` or `-acqf`, then `-ucb` or `-ei`, behind them."""
+    return tuple(sorted([*_RANDOM, *_DEFAULTS, *_NAMED_VARIANTS]))
 
 
 def needs_model(name: str) -> bool:
@@ -107,8 +149,8 @@ def needs_model(name: str) -> bool:
     Raises:
         LookupError: There is no such method.
     """
-    _recipe(name)
-    return name in _RECIPES_WITH_MODEL
+    base = _Name.read(name).base
+    return base in BELIEFS_OF_A_MODEL or base == "screened-random"
 
 
 def build(name: str, problem: Problem) -> Method:
@@ -118,51 +160,40 @@ def build(name: str, problem: Problem) -> Method:
         LookupError: There is no such method.
         ValueError: The problem lacks the latents or the pool that the method needs.
     """
-    recipe = _recipe(name)
+    read = _Name.read(name)
     try:
-        return recipe(problem)
+        return _RANDOM[name](problem) if name in _RANDOM else _optimisation(read, problem)
     except ValueError as error:
         raise ValueError(f"method {name!r}: {error}") from error
 
 
-def _recipe(name: str) -> Callable[[Problem], Method]:
-    recipes = _RECIPES | _RECIPES_WITH_MODEL
-    if name not in recipes:
-        nearest = difflib.get_close_matches(name, recipes, n=1, cutoff=0.0)[0]
-        raise LookupError(
-            f"method must be one of {', '.join(names())}, got {name!r}: did you mean {nearest!r}?"
-        )
-    return recipes[name]
+def _optimisation(name: _Name, problem: Problem) -> Method:
+    if name.search == "pool" and not len(problem.pool):
+        raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
+    kind = TrustRegionOptimisation if name.base == "turbo" else Optimisation
+    belief = (BELIEFS | BELIEFS_OF_A_MODEL)[name.base](problem)
+    return kind(belief, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])
 
 
-def _on_controllers(problem: Problem, kernel: KernelOf) -> Method:
-    return PoolOptimisation(
-        as_they_are(problem), partial(kernel, problem.dimensions), problem.objective_limits
-    )
+def _value(surrogate: Surrogate, acquisition: Acquisition, best: float) -> Value:
+    def value(phi: Tensor) -> Tensor:
+        return acquisition(*surrogate.moments(phi), best)
+
+    return value
 
 
-def _on_latents(problem: Problem, embedding: Embedding, kernel: KernelOf) -> Method:
-    candidates = by_latents(problem, embedding)
-    return PoolOptimisation(candidates, partial(kernel, candidates.phi.shape[1]), problem.objective_limits)
+def _lengthscales(surrogate: Surrogate) -> Tensor:
+    if not isinstance(surrogate, Process):
+        raise TypeError(f"a trust region needs a Process, got {type(surrogate).__name__}")
+    lengthscale: Tensor = surrogate.model.covar_module.base_kernel.lengthscale
+    return lengthscale.flatten()
 
 
-def _whitened(problem: Problem) -> Method:
-    latents = problem.known_latents()
-    # One lengthscale: whitening has already made the dimensions equal.
-    return _on_latents(problem, Whitened.over(latents.tau, latents.y), lambda _: kernels.se(1))
+def _without_suffix(name: str, suffixes: Mapping[str, object]) -> tuple[str, str]:
+    base, _, last = name.rpartition("-")
+    return (base, last) if last in suffixes else (name, "")
 
 
-_RECIPES: dict[str, Callable[[Problem], Method]] = {
-    "random": lambda problem: UniformSearch(problem.dimensions),
-    "botorch": lambda problem: BotorchDefault(problem.dimensions),
-    "se": partial(_on_controllers, kernel=kernels.se),
-    "matern": partial(_on_controllers, kernel=kernels.matern),
-}
-
-_RECIPES_WITH_MODEL: dict[str, Callable[[Problem], Method]] = {
-    "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),
-    "screened-svae": lambda problem: _on_latents(problem.least_bad(LEAST_BAD), svae, kernels.se),
-    "svae": partial(_on_latents, embedding=svae, kernel=kernels.se),
-    "svae-dc": partial(_on_latents, embedding=svae_dc, kernel=kernels.se),
-    "svae-dc-whitened": _whitened,
-}
+def _unknown(name: str) -> str:
+    nearest = difflib.get_close_matches(name, names(), n=1, cutoff=0.0)[0]
+    return f"method must be one of {', '.join(names())}, got {name!r}: did you mean {nearest!r}?"

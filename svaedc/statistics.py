@@ -3,118 +3,15 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from svaedc.intervals import Estimate, bootstrap, student_t
-
-
-@dataclass(frozen=True)
-class Row:
-    """What statistics need of one trial.
-
-    Attributes:
-        method: Name of the method.
-        run: The seed; runs of one seed share their first trials and hidden physics.
-        trial: From 0, the shared first trials included.
-        f: Objective; NaN when the trial failed.
-        success: Whether the task counts as solved.
-    """
-
-    method: str
-    run: int
-    trial: int
-    f: float
-    success: bool
-
-
-@dataclass(frozen=True)
-class Reporting:
-    """How a comparison is summarised.
-
-    Attributes:
-        initial: Shared first trials, which say nothing about a method's own suggestions.
-        broken_below: A trial with an objective below this counts as broken.
-        confidence: Of every interval.
-    """
-
-    initial: int = 2
-    broken_below: float = -0.5
-    confidence: float = 0.9
-
-    def __post_init__(self) -> None:
-        """Refuses settings without meaning."""
-        if self.initial < 0:
-            raise ValueError(f"initial must be at least 0, got {self.initial}")
-        if not 0 < self.confidence < 1:
-            raise ValueError(f"confidence must lie between 0 and 1, got {self.confidence}")
-
-
-@dataclass(frozen=True)
-class MethodSummary:
-    """One method over its complete runs.
-
-    Attributes:
-        runs: Complete runs.
-        incomplete: Runs left out because trials are missing.
-        best: Best objective so far, at each trial.
-        objective: Mean objective of the trials the method suggested.
-        successful_runs: Share of runs with a success.
-        successful_trials: Share of the suggested trials that succeeded.
-        broken_trials: Share of the suggested trials that broke.
-        failed_trials: Share of the suggested trials that gave no objective; they enter no other mean.
-    """
-
-    runs: int
-    incomplete: int
-    best: tuple[Estimate, ...]
-    objective: Estimate
-    successful_runs: Estimate
-    successful_trials: Estimate
-    broken_trials: Estimate
-    failed_trials: Estimate
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Method minus baseline on the runs both completed.
-
-    Attributes:
-        method: The one subtracted from.
-        baseline: The one subtracted.
-        runs: Shared complete runs.
-        best: Difference of the best objective so far, at each trial.
-        objective: Difference of the mean objective of the suggested trials.
-    """
-
-    method: str
-    baseline: str
-    runs: int
-    best: tuple[Estimate, ...]
-    objective: Estimate
-
-
-@dataclass(frozen=True)
-class Summary:
-    """All that is said about a comparison.
-
-    Attributes:
-        trials: Trials of a complete run.
-        methods: By name.
-        differences: Every method against every other.
-    """
-
-    trials: int
-    methods: Mapping[str, MethodSummary]
-    differences: tuple[Difference, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists, and numbers; NaN, which JSON lacks, becomes None."""
-        plain: dict[str, Any] = _without_nan(asdict(self))
-        return plain
+from svaedc.seeds import common_purpose
+from svaedc.significance import holm, sign_flip
+from svaedc.summaries import Difference, FirstSuccess, MethodSummary, Reporting, Row, Summary
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,19 +40,17 @@ def summarise(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
         rng: Draws the bootstrap resamples.
 
     Raises:
-        ValueError: There are no rows, or one trial has two.
+        ValueError: There are no rows, one trial has two, or reporting and tuning seeds are mixed.
     """
     by_method = _by_method(rows)
     length = max(len(trials) for runs in by_method.values() for trials in runs.values())
     complete = {name: _complete(by_method[name], length) for name in sorted(by_method)}
     return Summary(
         trials=length,
+        purpose=common_purpose(run for runs in by_method.values() for run in runs),
         methods={name: _of_method(runs, reporting) for name, runs in complete.items()},
         differences=tuple(
-            _difference(method, baseline, complete, reporting, rng)
-            for method in complete
-            for baseline in complete
-            if method != baseline
+            difference for method in complete for difference in _differences(method, complete, reporting, rng)
         ),
     )
 
@@ -192,6 +87,7 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
         incomplete=runs.incomplete,
         best=tuple(map(estimate, runs.best.T)),
         objective=estimate(_mean_of_rows(f)),
+        first_success=_first_success(runs.success, reporting),
         successful_runs=estimate(runs.success.any(axis=1).astype(float)),
         successful_trials=estimate(_mean_of_rows(success.astype(float))),
         broken_trials=estimate(_mean_of_rows(np.where(np.isnan(f), math.nan, f < reporting.broken_below))),
@@ -199,18 +95,40 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
     )
 
 
-def _difference(
-    method: str, baseline: str, complete: Mapping[str, _Runs], reporting: Reporting, rng: np.random.Generator
-) -> Difference:
-    ours, theirs = complete[method], complete[baseline]
+def _first_success(success: Bool[np.ndarray, "runs trials"], reporting: Reporting) -> FirstSuccess:
+    never = success.shape[1] - reporting.initial + 1
+    reached: Bool[np.ndarray, " runs"] = np.asarray(success.any(axis=1))
+    suggested = (success.argmax(axis=1) + 1 - reporting.initial).clip(0)
+    needed = np.where(reached, suggested, never).astype(float)
+    median = float(np.median(needed)) if 2 * reached.sum() > len(reached) else math.nan
+    return FirstSuccess(int(reached.sum()), median, student_t(needed, reporting.confidence))
+
+
+def _differences(
+    method: str, complete: Mapping[str, _Runs], reporting: Reporting, rng: np.random.Generator
+) -> list[Difference]:
+    """A method against every other, its p values corrected together."""
+    baselines = [name for name in complete if name != method]
+    paired = [_paired(complete[method], complete[name], reporting) for name in baselines]
+    if not paired:
+        return []
+    p = holm(np.stack([sign_flip(values, rng) for values in paired]))
+    estimates = [bootstrap(values, reporting.confidence, rng) for values in paired]
+    return [
+        Difference(method, name, len(values), each[:-1], each[-1], tuple(p_values[:-1]), p_values[-1])
+        for name, values, each, p_values in zip(baselines, paired, estimates, p.tolist(), strict=True)
+    ]
+
+
+def _paired(ours: _Runs, theirs: _Runs, reporting: Reporting) -> Float[np.ndarray, "runs columns"]:
+    """Differences of the shared runs: best so far at each trial, then the mean objective."""
     shared = sorted(set(ours.run) & set(theirs.run))
 
     def columns(runs: _Runs) -> Float[np.ndarray, "runs columns"]:
         rows = [runs.run.index(run) for run in shared]
         return np.column_stack([runs.best, _mean_of_rows(runs.f[:, reporting.initial :])])[rows]
 
-    *best, objective = bootstrap(columns(ours) - columns(theirs), reporting.confidence, rng)
-    return Difference(method, baseline, len(shared), tuple(best), objective)
+    return columns(ours) - columns(theirs)
 
 
 def _mean_of_rows(values: Float[np.ndarray, "runs trials"]) -> Float[np.ndarray, " runs"]:
@@ -219,11 +137,3 @@ def _mean_of_rows(values: Float[np.ndarray, "runs trials"]) -> Float[np.ndarray,
     total = np.where(counted, values, 0).sum(axis=1)
     count = counted.sum(axis=1)
     return np.divide(total, count, out=np.full(len(values), math.nan), where=count > 0)
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(part) for part in value]
-    return None if isinstance(value, float) and math.isnan(value) else value

@@ -1,14 +1,17 @@
 """Collecting one shard: the whole of a rollout worker's job."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
+from workers.dataset.identity import identity_of
+from workers.dataset.publication import host
 from workers.dataset.shards import Shard
-from workers.rollout import DIVERGED, random_episode
+from workers.rollout import DIVERGED, Episode, random_episode
 from workers.setups import MODULES, Setup
 
 
@@ -25,6 +28,8 @@ class ShardReport:
         size: bytes on disk.
         rollout_seconds: CPU time of this process in rollouts.
         storage_seconds: CPU time in encoding, hashing and writing.
+        seconds: wall time of both.
+        machine: the host name of the machine that did it.
     """
 
     shard: Shard
@@ -35,6 +40,8 @@ class ShardReport:
     size: int
     rollout_seconds: float
     storage_seconds: float
+    seconds: float
+    machine: str
 
 
 def require_working(setup: Setup, seed: int) -> None:
@@ -49,19 +56,35 @@ def require_working(setup: Setup, seed: int) -> None:
             random_episode(setup, environment, seed, 0)
 
 
-def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:
-    """Roll out the episodes of a shard in a fresh simulation and commit its file.
+def roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
+    """The episodes of a shard, in a fresh simulation."""
+    seed, repeats = dataset.identity.seed, dataset.identity.repeats
+    with setup.open() as environment:
+        return [
+            random_episode(setup, environment, seed, index, repeats)
+            for index in range(shard.start, shard.stop)
+        ]
+
+
+def collect_shard(
+    setup: Setup,
+    dataset: Dataset,
+    shard: Shard,
+    roll_out: Callable[[Setup, Dataset, Shard], list[Episode]] = roll_out,
+) -> ShardReport:
+    """Roll out the episodes of a shard and commit its file.
+
+    Args:
+        setup: of the dataset.
+        dataset: to which the shard belongs.
+        shard: which episodes.
+        roll_out: makes them.
 
     Raises:
         OSError: when the disk is full or not writable; nothing is left behind.
     """
-    begin = time.process_time()
-    seed, repeats = dataset.identity.seed, dataset.identity.repeats
-    with setup.open() as environment:
-        episodes = [
-            random_episode(setup, environment, seed, index, repeats)
-            for index in range(shard.start, shard.stop)
-        ]
+    started, begin = time.monotonic(), time.process_time()
+    episodes = roll_out(setup, dataset, shard)
     rolled_out = time.process_time()
     path = shards.commit(
         dataset.folder, shard, lambda target: schema.write(target, dataset.identity, shard.start, episodes)
@@ -75,4 +98,24 @@ def collect_shard(setup: Setup, dataset: Dataset, shard: Shard) -> ShardReport:
         size=path.stat().st_size,
         rollout_seconds=rolled_out - begin,
         storage_seconds=time.process_time() - rolled_out,
+        seconds=time.monotonic() - started,
+        machine=host(),
     )
+
+
+def require_same_code(setup: Setup, dataset: Dataset) -> None:
+    """Refuse to roll out where the episodes would differ from those that the dataset promises.
+
+    Raises:
+        ValueError: naming this machine, and what differs in its code or libraries.
+    """
+    asked = dataset.identity
+    own = identity_of(
+        setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard, repeats=asked.repeats
+    )
+    differences = asked.differences(own)
+    if differences:
+        raise ValueError(
+            f"the machine {host()} would roll out other episodes than {dataset.folder} holds; the two differ "
+            f"in {'; '.join(differences)}. Install the same svaedc and libraries on every machine"
+        )

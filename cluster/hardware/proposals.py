@@ -1,7 +1,7 @@
 """From a campaign's plan to the method that proposes its controllers."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,7 +14,9 @@ from cluster.hardware.campaign import Suggest
 from cluster.hardware.identity import Identity
 from svaedc import checkpoint, methods
 from svaedc.candidates import Problem
+from svaedc.densities import Densities
 from svaedc.features import Latents
+from svaedc.model import SvaeDc
 from workers.randomness import generator
 from workers.setups import Setup
 
@@ -44,9 +46,12 @@ class Proposals:
         pool = (
             generator(identity.seed, "pool", 0).random((identity.pool, setup.dimensions)).astype(np.float32)
         )
-        latents = _latents(identity, model, pool) if methods.needs_model(identity.method) else None
-        problem = Problem(setup.dimensions, setup.objective_limits, pool, latents)
-        return cls(methods.build(identity.method, problem).suggest, latents)
+        problem = Problem(setup.dimensions, setup.objective_limits, pool)
+        if methods.needs_model(identity.method):
+            network = _network(identity, model)
+            latents = Latents.of(torch.tensor(pool), network.latent_means)
+            problem = replace(problem, latents=latents, densities=Densities.of(network))
+        return cls(methods.build(identity.method, problem).suggest, problem.latents)
 
     def predicted_badness(self, x: Float[np.ndarray, " D"]) -> float | None:
         """Badness of x as the model expects it, in [0, 1]; None without a model."""
@@ -77,7 +82,7 @@ def library_versions() -> dict[str, str]:
     return {library: version(library) for library in LIBRARIES}
 
 
-def _latents(identity: Identity, model: Path | None, pool: Float[np.ndarray, "n D"]) -> Latents:
+def _network(identity: Identity, model: Path | None) -> SvaeDc:
     if model is None:
         raise UserError(f"method {identity.method!r} needs a trained model, got none; give one with --model")
     if fingerprint(model) != identity.model:
@@ -87,4 +92,4 @@ def _latents(identity: Identity, model: Path | None, pool: Float[np.ndarray, "n 
         checkpoint.require(model, metadata, {"setup": identity.setup})
     except ValueError as error:
         raise UserError(str(error)) from error
-    return Latents.of(torch.tensor(pool), network.requires_grad_(requires_grad=False).latent_means)
+    return network.requires_grad_(requires_grad=False)

@@ -1,6 +1,7 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -74,6 +75,8 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     assert info.returncode == 0, info.stderr
     assert "16 in 2 shards" in info.stdout
     assert "object_tipped" in info.stdout
+    assert re.search(r"diverged +0\b", info.stdout)
+    assert re.search(r"stopped +0\b", info.stdout)
     assert svaedc("dataset", "verify", str(small_dataset), folder=tmp_path).returncode == 0
     broken = tmp_path / "broken"
     broken.mkdir()

@@ -11,7 +11,8 @@ from cluster.demo import DemoSize, conclusion, demo, verdict
 from cluster.errors import UserError
 from cluster.session import Session
 from cluster.tracking import open_tracker
-from svaedc.statistics import Reporting, Row, summarise
+from svaedc.statistics import summarise
+from svaedc.summaries import Reporting, Row
 from workers.randomness import generator
 
 ALONE = Session("127.0.0.1:1", is_local=True, cpus=1)

@@ -1,9 +1,11 @@
-"""A stand-in for the trained model: latent paths linear in x, and a smooth badness."""
+"""A stand-in for the trained model: latent paths linear in x, a smooth badness, and distributions of both."""
 
 import numpy as np
 import torch
 
+from svaedc import divergences
 from svaedc.candidates import Problem
+from svaedc.densities import Densities, Density
 from svaedc.features import Latents
 
 TAU_DIMENSIONS = 3
@@ -17,11 +19,18 @@ def latent_means(x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     )
 
 
+def rows(x: torch.Tensor) -> torch.Tensor:
+    """[location | log scale]: located at tau, wider where x_1 is large."""
+    tau = latent_means(x.double())[0]
+    return torch.cat([tau, (x.double()[:, 1:2] - 1).expand_as(tau)], dim=-1)
+
+
 def problem(dimensions: int, candidates: int, seed: int) -> Problem:
     """A run's problem with a random pool and its fake latents, objectives between -1 and 1."""
     pool = np.random.default_rng(seed).random((candidates, dimensions), dtype=np.float32)
     latents = Latents.of(torch.tensor(pool), latent_means)
-    return Problem(dimensions, (-1.0, 1.0), pool, latents)
+    densities = Densities(tau=Density(rows, divergences.laplace), xi=Density(rows, divergences.gaussian))
+    return Problem(dimensions, (-1.0, 1.0), pool, latents, densities)
 
 
 def quadratic(x: np.ndarray) -> float:

@@ -1,7 +1,9 @@
+import math
+
 import pytest
 import torch
 
-from svaedc.features import Latents, Whitened, svae, svae_dc
+from svaedc.features import Latents, Sigmoid, Whitened, svae, svae_dc
 from tests.svaedc.fake_latents import latent_means
 
 
@@ -21,6 +23,20 @@ def test_compression_is_the_formula_element_by_element():
 def test_controllers_without_badness_are_not_compressed():
     means, _ = latents()
     torch.testing.assert_close(svae_dc(means.tau, torch.zeros_like(means.y)), svae(means.tau, means.y))
+
+
+def test_sigmoid_compression_is_the_formula_and_one_half_at_its_midpoint():
+    means, _ = latents()
+    factors = [1 / (1 + math.exp(-12 * ((1 - y) - 0.6))) for y in means.y.tolist()]
+    expected = torch.tensor(factors, dtype=torch.float64)[:, None] * means.tau
+    torch.testing.assert_close(Sigmoid(alpha=12.0, c=0.6)(means.tau, means.y), expected)
+    midpoint = torch.full_like(means.y, 1 - 0.6)
+    torch.testing.assert_close(Sigmoid(12.0, 0.6)(means.tau, midpoint), means.tau / 2)
+
+
+def test_sigmoid_that_would_enlarge_what_is_bad_is_refused():
+    with pytest.raises(ValueError, match=r"alpha must be above 0, got -25\.0"):
+        Sigmoid(alpha=-25.0)
 
 
 def test_entirely_bad_controllers_coincide():

@@ -2,10 +2,8 @@ import math
 
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from svaedc import kernels
+from svaedc import divergences, kernels
 from svaedc.features import svae_dc
 from tests.svaedc.fake_latents import latent_means
 
@@ -49,66 +47,56 @@ def test_kernel_is_the_formula_pair_by_pair(kernel, profile, lengthscales):
 
 
 def test_svae_dc_is_the_formula_pair_by_pair():
-    x = points(7, 5)
     lengthscales = [0.3, 0.8, 1.4]
-    kernel = kernels.SvaeDc(with_lengthscales(kernels.se(3), lengthscales), latent_means)
-    tau, y = latent_means(x)
+    kernel = kernels.Compressed(with_lengthscales(kernels.se(3), lengthscales), svae_dc)
+    tau, y = latent_means(points(7, 5))
     phi = torch.stack([(1 - b) * t for t, b in zip(tau, y, strict=True)])
-    torch.testing.assert_close(kernel(x).to_dense(), brute_force(se_profile, phi, phi, lengthscales))
+    rows = torch.cat([tau, y[:, None]], dim=1)
+    torch.testing.assert_close(kernel(rows).to_dense(), brute_force(se_profile, phi, phi, lengthscales))
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_svae_dc_on_controllers_equals_the_outer_kernel_on_cached_features(kernel):
-    x = points(9, 4)
+def test_svae_dc_on_latents_equals_the_outer_kernel_on_cached_features(kernel):
+    tau, y = latent_means(points(9, 4))
     outer = kernel(3).double()
-    torch.testing.assert_close(
-        kernels.SvaeDc(outer, latent_means)(x).to_dense(), outer(svae_dc(*latent_means(x))).to_dense()
-    )
+    whole = kernels.Compressed(outer, svae_dc)(torch.cat([tau, y[:, None]], dim=1))
+    torch.testing.assert_close(whole.to_dense(), outer(svae_dc(tau, y)).to_dense())
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
-def test_entirely_bad_controllers_are_alike_to_the_kernel(kernel):
-    outer = kernel(3).double()
-    same = kernels.SvaeDc(outer, lambda x: (latent_means(x)[0], torch.ones(len(x)).double()))
-    matrix = same(points(8, 4)).to_dense()
-    torch.testing.assert_close(matrix, torch.full_like(matrix, outer.outputscale.item()))
-
-
-def test_svae_dc_predicts_batches_and_diagonals_like_single_matrices():
-    x = points(12, 4).reshape(3, 4, 4)
-    kernel = kernels.SvaeDc(kernels.se(3).double(), latent_means)
-    each = torch.stack([kernel(part).to_dense() for part in x])
-    torch.testing.assert_close(kernel(x).to_dense(), each)
-    torch.testing.assert_close(kernel(x, diag=True), each.diagonal(dim1=-2, dim2=-1))
-
-
-def test_gradients_of_svae_dc_reach_the_controller():
-    x = points(1, 4).requires_grad_()
-    kernels.SvaeDc(kernels.se(3).double(), latent_means)(x, points(3, 4, seed=2)).to_dense().sum().backward()
-    assert x.grad is not None
-    assert x.grad.abs().min() > 0
-
-
-def test_frozen_model_is_no_part_of_the_kernel():
-    network = torch.nn.Linear(4, 3).double()
-    kernel = kernels.SvaeDc(kernels.se(3), lambda x: (network(x), x[:, 0]))
-    held = {id(parameter) for parameter in kernel.parameters()}
-    assert held
-    assert not held & {id(parameter) for parameter in network.parameters()}
-
-
-@settings(deadline=None, max_examples=40)
-@given(
-    kernel=st.sampled_from(KERNELS),
-    count=st.integers(1, 15),
-    seed=st.integers(0, 10_000),
-    lengthscale=st.floats(*kernels.LENGTHSCALE, exclude_min=True, exclude_max=True),
+@pytest.mark.parametrize(
+    ("divergence", "family"),
+    [(divergences.gaussian, torch.distributions.Normal), (divergences.laplace, torch.distributions.Laplace)],
 )
-def test_every_kernel_matrix_is_symmetric_and_positive_semi_definite(kernel, count, seed, lengthscale):
-    outer = with_lengthscales(kernel(1), [lengthscale])
-    matrix = kernels.SvaeDc(outer, latent_means)(points(count, 4, seed)).to_dense().detach()
-    torch.testing.assert_close(matrix, matrix.T)
-    assert torch.linalg.eigvalsh(matrix).min() > -1e-9 * count
+def test_kl_kernel_is_the_formula_pair_by_pair(divergence, family):
+    x1, x2 = (
+        torch.cat([points(n, 4, seed), points(n, 4, seed + 5) - 0.5], dim=1) for n, seed in ((6, 0), (3, 1))
+    )
+    kernel = kernels.kl(divergence, median=3.0).double()
+    kernel.outputscale = 0.7
+    kernel.base_kernel.initialize(raw_alpha=torch.tensor(0.4))
+    alpha = kernel.base_kernel.alpha.item()
+
+    def kl(a, b):
+        p, q = (family(row[:4], row[4:].exp()) for row in (a, b))
+        return torch.distributions.kl_divergence(p, q).sum().item()
+
+    def value(a, b):
+        return 0.7 * math.exp(-alpha * (math.sqrt(kl(a, b)) + math.sqrt(kl(b, a))))
+
+    expected = torch.tensor([[value(a, b) for b in x2] for a in x1], dtype=torch.float64)
+    torch.testing.assert_close(kernel(x1, x2).to_dense(), expected)
+
+
+def test_alpha_starts_at_the_inverse_of_the_median_distance():
+    assert kernels.kl(divergences.gaussian, median=4.0).base_kernel.alpha.item() == pytest.approx(0.25)
+
+
+def test_kl_kernel_of_gaussians_of_one_scale_is_an_exponential_of_their_distance():
+    mu = points(8, 3)
+    rows = torch.cat([mu, torch.full_like(mu, math.log(0.2))], dim=1)
+    matrix = kernels.kl(divergences.gaussian, median=1.0).double()(rows, rows + 0).to_dense()
+    expected = 0.5 * torch.exp(-math.sqrt(2) * torch.cdist(mu, mu) / 0.2)
+    torch.testing.assert_close(matrix, expected, atol=1e-6, rtol=1e-6)
 
 
 def test_kernel_without_lengthscales_is_refused():

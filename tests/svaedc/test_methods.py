@@ -86,7 +86,7 @@ def test_features_are_in_units_of_their_typical_distance():
 def test_measured_controller_of_the_pool_has_the_features_of_its_candidate():
     given = problem(4, 20, 0)
     candidates = by_latents(given, svae_dc)
-    torch.testing.assert_close(candidates.features_of(given.pool.astype(float)), candidates.phi)
+    torch.testing.assert_close(candidates.features_of(torch.tensor(given.pool).double()), candidates.phi)
 
 
 def test_pool_of_identical_controllers_is_no_division_by_zero():
@@ -96,12 +96,11 @@ def test_pool_of_identical_controllers_is_no_division_by_zero():
 
 def test_model_is_needed_exactly_where_latents_are_used():
     assert [name for name in methods.names() if methods.needs_model(name)] == [
-        "screened-random",
-        "screened-svae",
-        "svae",
-        "svae-dc",
-        "svae-dc-whitened",
+        *("bbk-kl", "lkl", "screened-random", "screened-svae", "svae", "svae-dc", "svae-dc-matern"),
+        *("svae-dc-sigmoid", "svae-dc-whitened", "svae-matern"),
     ]
+    assert methods.needs_model("svae-dc-acqf-ei")
+    assert not methods.needs_model("botorch-pool-ucb")
 
 
 def test_unknown_method_is_refused_with_the_nearest_name():
@@ -110,10 +109,51 @@ def test_unknown_method_is_refused_with_the_nearest_name():
             use("svae-cd")
 
 
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("se-pool", r"repeat what 'se' does anyway \(pool, ucb\), got 'se-pool'"),
+        ("se-acqf-ucb", r"repeat what 'se' does anyway"),
+        ("botorch-ei", r"repeat what 'botorch' does anyway \(acqf, ei\)"),
+        ("random-acqf", r"one of .*got 'random-acqf': did you mean 'random'"),
+        ("se-ei-acqf", r"one of .*got 'se-ei-acqf'"),
+        ("-ei", r"one of .*got '-ei'"),
+    ],
+)
+def test_every_method_has_one_name(name, message):
+    with pytest.raises(LookupError, match=message):
+        methods.needs_model(name)
+
+
+def test_kernel_is_asked_for_a_lengthscale_per_dimension_except_where_whitening_made_them_equal():
+    given = problem(4, 30, 0)
+    history = History.empty(4)
+    for x in given.pool[:3]:
+        history = history.append(x, quadratic(x))
+    expected = {"se": 4, "matern": 4, "svae": 3, "svae-dc-matern": 3, "svae-dc-whitened": 1}
+    for name, count in expected.items():
+        surrogate, _ = methods.build(name, given).belief.after(history)
+        assert surrogate.model.covar_module.base_kernel.lengthscale.numel() == count
+
+
+def test_trust_region_keeps_to_its_box_and_begins_anew_with_random_controllers():
+    method, history = methods.build("turbo-pool", problem(4, 200, 0)), History.empty(4)
+    for x in np.random.default_rng(0).random((2, 4), dtype=np.float32):
+        history = history.append(x, 0.0)
+    centre = history.x[0]
+    # Flat outcomes halve the box from 0.8 until it is left: 7 halvings of 4 failures each.
+    for index in range(28):
+        x = method.suggest(history, np.random.default_rng(index))
+        history = history.append(x, 0.0)
+    assert np.abs(history.x[-1] - centre).max() < 0.05 < np.abs(history.x[2] - centre).max()
+    fresh = [method.suggest(history, np.random.default_rng(index)) for index in range(20)]
+    assert np.abs(np.array(fresh) - centre).max() > 0.4
+
+
 def test_method_without_its_model_or_pool_says_what_to_do():
     pool = problem(2, 5, 0).pool
     for name in filter(methods.needs_model, methods.names()):
-        with pytest.raises(ValueError, match=rf"'{name}': latents must be.*train one"):
+        with pytest.raises(ValueError, match=rf"'{name}': (latents|densities) must be.*train one"):
             methods.build(name, Problem(2, (0.0, 1.0), pool))
     with pytest.raises(ValueError, match=r"'se'.*got 0 controllers"):
         methods.build("se", Problem(2, (0.0, 1.0), pool[:0]))

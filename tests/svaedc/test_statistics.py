@@ -10,7 +10,9 @@ from hypothesis.extra import numpy as arrays
 from scipy import stats
 
 from svaedc.intervals import Estimate, bootstrap, student_t
-from svaedc.statistics import Reporting, Row, summarise
+from svaedc.significance import holm, sign_flip
+from svaedc.statistics import summarise
+from svaedc.summaries import Reporting, Row
 
 OBJECTIVE = st.one_of(st.floats(-2, 2, width=32), st.just(math.nan))
 
@@ -91,6 +93,53 @@ def test_broken_and_failed_trials_are_counted_apart():
     assert lenient.broken_trials.mean == pytest.approx((1 / 3 + 0) / 2)
 
 
+def test_trials_needed_are_counted_from_the_first_suggestion():
+    f = np.zeros((5, 6))
+    f[0, 2] = f[1, 4] = f[2, 0] = f[3, 5] = 1.0
+    found = summary(rows("ours", f)).methods["ours"].first_success
+    # Run 2 succeeds among the shared trials; run 4 never does, and counts as one trial more than it had.
+    assert (found.reached, found.median) == (4, 3.0)
+    assert found.mean == student_t(np.array([1.0, 3.0, 0.0, 4.0, 5.0]), 0.9)
+
+
+def test_threshold_nobody_reaches_has_no_median_and_says_so():
+    found = summary(rows("ours", np.zeros((4, 6)))).methods["ours"]
+    assert found.first_success.reached == 0
+    assert math.isnan(found.first_success.median)
+    assert found.successful_runs.mean == 0
+    assert json.loads(json.dumps(summary(rows("ours", np.zeros((4, 6)))).as_json()))["methods"]["ours"][
+        "first_success"
+    ] == {"reached": 0, "median": None, "mean": {"mean": 5.0, "low": 5.0, "high": 5.0}}
+
+
+def test_median_needs_more_than_half_of_the_runs():
+    f = np.zeros((4, 6))
+    f[:2, 3] = 1.0
+    assert math.isnan(summary(rows("ours", f)).methods["ours"].first_success.median)
+    f[2, 5] = 1.0
+    assert summary(rows("ours", f)).methods["ours"].first_success.median == 3.0
+
+
+def test_p_values_are_corrected_for_the_number_of_baselines_at_each_trial():
+    f = np.random.default_rng(0).normal(size=(3, 8, 4))
+    given = [row for name, each in zip("abc", f, strict=True) for row in rows(name, each)]
+    ours = [d for d in summary(given).differences if d.method == "a"]
+    best = np.maximum.accumulate(f, axis=2)
+    for trial in range(4):
+        plain = [sign_flip(best[0] - best[i], np.random.default_rng(0))[trial] for i in (1, 2)]
+        expected = holm(np.array(plain)[:, None])[:, 0]
+        assert [d.p_best[trial] for d in ours] == pytest.approx(expected)
+
+
+def test_reporting_and_tuning_seeds_are_told_apart_and_never_mixed():
+    given = rows("ours", np.zeros((2, 3)))
+    assert summary(given).purpose == "reporting"
+    tuning = [Row(row.method, row.run + 1000, row.trial, row.f, row.success) for row in given]
+    assert summary(tuning).purpose == "tuning"
+    with pytest.raises(ValueError, match="got 0 to 1001"):
+        summary(given + tuning)
+
+
 def test_difference_is_paired_by_run():
     common = np.random.default_rng(0).normal(scale=100, size=(10, 5))
     ours, theirs = common + 0.5, common
@@ -145,7 +194,7 @@ def test_mean_of_best_so_far_never_falls(f):
 @given(arrays.arrays(float, (3, 5), elements=OBJECTIVE))
 def test_summary_is_strict_json_whatever_failed(f):
     text = json.dumps(summary(rows("ours", f) + rows("theirs", f)).as_json(), allow_nan=False)
-    assert set(json.loads(text)) == {"trials", "methods", "differences"}
+    assert set(json.loads(text)) == {"trials", "purpose", "methods", "differences"}
 
 
 def test_rows_that_contradict_each_other_are_refused():

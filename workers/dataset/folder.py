@@ -88,7 +88,7 @@ def create(folder: Path, identity: Identity) -> Dataset:
     manifest = folder / MANIFEST
     if not manifest.exists():
         with temporary_file(folder, MANIFEST) as temporary:
-            temporary.write_text(json.dumps(json.loads(identity.to_json()), indent=2) + "\n")
+            temporary.write_text(manifest_text(identity))
             synchronise(temporary)
             link(temporary, manifest)
     dataset = open_dataset(folder)
@@ -100,6 +100,11 @@ def create(folder: Path, identity: Identity) -> Dataset:
             + ". Choose another folder, or ask for the same"
         )
     return dataset
+
+
+def manifest_text(identity: Identity) -> str:
+    """The content of `dataset.json`."""
+    return json.dumps(json.loads(identity.to_json()), indent=2) + "\n"
 
 
 def open_dataset(folder: Path) -> Dataset:

@@ -30,13 +30,27 @@ def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Problem]]]:
 
     Episodes between shards that nobody has collected yet are no fault of a file: see `gaps`.
     """
-    reached = 0
+    doubled = overlaps(dataset)
     for shard in dataset.shards():
-        found = chain(
-            _overlap_problems(shard, reached), _byte_problems(dataset, shard), _row_problems(dataset, shard)
-        )
-        yield shard, [Problem(shard.name, what) for what in found]
+        beside = [problem for problem in doubled if problem.file == shard.name]
+        yield shard, beside + file_problems(dataset, shard)
+
+
+def overlaps(dataset: Dataset) -> list[Problem]:
+    """The shards that hold episodes once more; each may be whole in itself."""
+    found, reached = [], 0
+    for shard in dataset.shards():
+        if shard.start < reached:
+            what = f"it overlaps: episodes below {reached} are in files before it"
+            found.append(Problem(shard.name, what))
         reached = max(reached, shard.stop)
+    return found
+
+
+def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
+    """What is wrong with a shard in itself, whatever lies beside it."""
+    found = chain(_byte_problems(dataset, shard), _row_problems(dataset, shard))
+    return [Problem(shard.name, what) for what in found]
 
 
 def gaps(dataset: Dataset) -> Iterator[Shard]:
@@ -48,17 +62,16 @@ def gaps(dataset: Dataset) -> Iterator[Shard]:
         reached = max(reached, shard.stop)
 
 
-def _overlap_problems(shard: Shard, reached: int) -> Iterator[str]:
-    if shard.start < reached:
-        yield f"it overlaps: episodes below {reached} are in files before it"
-
-
 def _byte_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
+    digest_path = shards.digest_path(dataset.folder, shard)
     recorded = shards.recorded_digest(dataset.folder, shard)
     if not recorded:
         yield "its .sha256 file is missing"
-    elif shards.sha256(dataset.path(shard)) != recorded:
+        return
+    if shards.sha256(dataset.path(shard)) != recorded:
         yield "its bytes differ from its .sha256 file"
+    elif digest_path.read_text(errors="replace") != shards.digest_line(shard, recorded):
+        yield "its .sha256 file is not as `sha256sum` writes it"
 
 
 def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:

@@ -3,11 +3,10 @@ import math
 import numpy as np
 import pytest
 import torch
-from botorch.acquisition.analytic import UpperConfidenceBound
 from gpytorch.kernels import RBFKernel
 from linear_operator.utils.errors import NotPSDError
 
-from svaedc import bo, kernels
+from svaedc import kernels, surrogates
 
 
 def trials(count, dimensions=3, seed=0):
@@ -27,7 +26,8 @@ def hyper_parameters(model):
 def test_prediction_is_the_closed_form_of_a_gaussian_process():
     phi, f = trials(9)
     candidates, _ = trials(7, seed=1)
-    model = bo.fit(isotropic, phi, f).model
+    process = surrogates.fit(isotropic, phi, f)
+    model = process.model
     ell, sigma2 = model.covar_module.base_kernel.lengthscale.item(), model.covar_module.outputscale.item()
     noise, mean = model.likelihood.noise.item(), model.mean_module.constant.item()
 
@@ -38,23 +38,33 @@ def test_prediction_is_the_closed_form_of_a_gaussian_process():
     inverse = np.linalg.inv(k(x, x) + noise * np.eye(len(x)))
     mu = mean + k(z, x) @ inverse @ (f.numpy() - mean)
     sigma = np.sqrt(np.diag(k(z, z) - k(z, x) @ inverse @ k(x, z)))
-    np.testing.assert_allclose(bo.ucb(model, candidates).numpy(), mu + sigma, rtol=1e-6)
+    for ours, theirs in zip(process.moments(candidates), (mu, sigma), strict=True):
+        np.testing.assert_allclose(ours.numpy(), theirs, rtol=1e-6)
 
 
-@pytest.mark.parametrize("candidates", [1, bo.BLOCK - 1, bo.BLOCK, 2 * bo.BLOCK + 3])
-def test_ucb_in_blocks_is_that_of_botorch(candidates):
+def test_moments_are_those_of_botorch_whatever_the_batch():
     phi, f = trials(12)
-    pool, _ = trials(candidates, seed=1)
-    model = bo.fit(isotropic, phi, f).model
+    pool, _ = trials(24, seed=1)
+    process = surrogates.fit(lambda: kernels.matern(3), phi, f)
     with torch.no_grad():
-        theirs = UpperConfidenceBound(model, beta=1.0)(pool[:, None])
-    torch.testing.assert_close(bo.ucb(model, pool), theirs)
+        theirs = process.model.posterior(pool[:, None])
+    for shape in ((24,), (24, 1), (2, 3, 4)):
+        mu, sigma = process.moments(pool.reshape(*shape, 3))
+        torch.testing.assert_close(mu.flatten(), theirs.mean.flatten())
+        torch.testing.assert_close(sigma.flatten(), theirs.variance.sqrt().flatten())
+
+
+def test_gradients_reach_the_features_and_leave_the_hyper_parameters_alone():
+    process = surrogates.fit(isotropic, *trials(6))
+    phi = trials(2, seed=1)[0].requires_grad_()
+    assert torch.autograd.gradcheck(process.moments, phi)
+    assert not any(parameter.requires_grad for parameter in process.model.parameters())
 
 
 @pytest.mark.parametrize("kernel", [isotropic, lambda: kernels.se(3), lambda: kernels.matern(3)])
 @pytest.mark.parametrize("count", [1, 2, 22])
 def test_fitted_hyper_parameters_stay_within_their_ranges(kernel, count):
-    surrogate = bo.fit(kernel, *trials(count))
+    surrogate = surrogates.fit(kernel, *trials(count))
     covariance = surrogate.model.covar_module
 
     def within(values, low, high):
@@ -64,7 +74,7 @@ def test_fitted_hyper_parameters_stay_within_their_ranges(kernel, count):
     assert surrogate.event == ""
     assert within(covariance.base_kernel.lengthscale, *kernels.LENGTHSCALE)
     assert within(covariance.outputscale, *kernels.OUTPUT_SCALE)
-    assert within(surrogate.model.likelihood.noise, bo.LEAST_NOISE, math.inf)
+    assert within(surrogate.model.likelihood.noise, surrogates.LEAST_NOISE, math.inf)
     assert within(surrogate.model.mean_module.constant, 0, 1)
 
 
@@ -82,23 +92,24 @@ def test_fit_raises_the_marginal_likelihood_of_the_starting_point():
         return kernel
 
     assert (
-        log_likelihood(bo.fit(isotropic, phi, f).model) > log_likelihood(bo.fit(unfitted, phi, f).model) + 0.1
+        log_likelihood(surrogates.fit(isotropic, phi, f).model)
+        > log_likelihood(surrogates.fit(unfitted, phi, f).model) + 0.1
     )
 
 
 def test_dimension_without_influence_gets_the_longer_lengthscale():
     generator = torch.Generator().manual_seed(3)
     phi = torch.rand(25, 2, generator=generator, dtype=torch.float64)
-    model = bo.fit(lambda: kernels.se(2), phi, 0.5 + 0.4 * torch.sin(8 * phi[:, 0])).model
+    model = surrogates.fit(lambda: kernels.se(2), phi, 0.5 + 0.4 * torch.sin(8 * phi[:, 0])).model
     relevant, irrelevant = model.covar_module.base_kernel.lengthscale.flatten().tolist()
     assert irrelevant > 3 * relevant
 
 
 def test_repeated_controllers_with_different_outcomes_do_not_break_the_fit():
     phi, f = torch.full((20, 3), 0.5).double(), torch.linspace(0, 1, 20).double()
-    surrogate = bo.fit(isotropic, phi, f)
+    surrogate = surrogates.fit(isotropic, phi, f)
     assert surrogate.event == ""
-    assert torch.isfinite(bo.ucb(surrogate.model, phi)).all()
+    assert torch.isfinite(torch.stack(surrogate.moments(phi))).all()
 
 
 class FailsInFitsOfMoreThan(RBFKernel):
@@ -116,8 +127,8 @@ class FailsInFitsOfMoreThan(RBFKernel):
 
 def test_failed_fit_keeps_the_last_good_hyper_parameters_and_says_so(caplog):
     phi, f = trials(8)
-    surrogate = bo.fit(lambda: FailsInFitsOfMoreThan(5), phi, f)
-    last_good = bo.fit(lambda: FailsInFitsOfMoreThan(5), phi[:5], f[:5])
+    surrogate = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi, f)
+    last_good = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi[:5], f[:5])
     assert last_good.event == ""
     for name, value in hyper_parameters(last_good.model).items():
         torch.testing.assert_close(hyper_parameters(surrogate.model)[name], value)
@@ -127,39 +138,19 @@ def test_failed_fit_keeps_the_last_good_hyper_parameters_and_says_so(caplog):
 
 def test_surrogate_with_borrowed_hyper_parameters_still_knows_every_trial():
     phi, f = trials(8)
-    model = bo.fit(lambda: FailsInFitsOfMoreThan(5), phi, f).model
+    model = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi, f).model
     torch.testing.assert_close(model.train_inputs[0], phi)
     torch.testing.assert_close(model.train_targets, f)
 
 
 def test_fit_that_never_succeeds_predicts_with_the_starting_hyper_parameters():
     phi, f = trials(3)
-    surrogate = bo.fit(lambda: FailsInFitsOfMoreThan(0), phi, f)
+    surrogate = surrogates.fit(lambda: FailsInFitsOfMoreThan(0), phi, f)
     assert surrogate.event
     assert surrogate.model.covar_module.lengthscale.item() == pytest.approx(math.log(2))
-    assert torch.isfinite(bo.ucb(surrogate.model, phi)).all()
+    assert torch.isfinite(torch.stack(surrogate.moments(phi))).all()
 
 
 def test_scaling_puts_the_limits_at_zero_and_one():
     f = torch.tensor([-2.0, 0.0, 2.0, 4.0], dtype=torch.float64)
-    assert bo.scaled(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]
-
-
-def test_torch_draws_from_the_generator_and_its_global_state_is_left_alone():
-    torch.manual_seed(1)
-    untouched = torch.rand(3)
-    torch.manual_seed(1)
-    with bo.torch_randomness(np.random.default_rng(7)):
-        first = torch.rand(3)
-    torch.testing.assert_close(torch.rand(3), untouched)
-    with bo.torch_randomness(np.random.default_rng(7)):
-        torch.testing.assert_close(torch.rand(3), first)
-    with bo.torch_randomness(np.random.default_rng(8)):
-        assert not torch.equal(torch.rand(3), first)
-
-
-def test_log_expected_improvement_searches_the_cube_up_to_its_corners():
-    x = torch.tensor([[0.2, 0.2], [0.5, 0.4], [0.8, 0.3], [0.3, 0.9], [0.7, 0.8]], dtype=torch.float64)
-    with bo.torch_randomness(np.random.default_rng(0)):
-        best = bo.maximise_log_ei(x, 10 + 5 * x.sum(dim=1))
-    assert best.tolist() == pytest.approx([1.0, 1.0], abs=0.05)
+    assert surrogates.scaled(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]

@@ -1,20 +1,16 @@
-"""One step of Bayesian optimisation: a Gaussian process fitted to the history, and what to try next."""
+"""What is expected of controllers that were not tried: a Gaussian process fitted to the history."""
 
 import logging
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from botorch.acquisition.analytic import LogExpectedImprovement
 from botorch.exceptions.errors import ModelFittingError
 from botorch.exceptions.warnings import OptimizationWarning
-from botorch.fit import fit_gpytorch_mll
 from botorch.models import SingleTaskGP
 from botorch.optim.fit import fit_gpytorch_mll_scipy
-from botorch.optim.optimize import optimize_acqf
 from botorch.settings import validate_input_scaling
 from gpytorch.constraints import GreaterThan, Interval
 from gpytorch.kernels import Kernel
@@ -22,34 +18,65 @@ from gpytorch.likelihoods import GaussianLikelihood
 from gpytorch.means import ConstantMean
 from gpytorch.mlls import ExactMarginalLogLikelihood
 from jaxtyping import Float
+from linear_operator.utils.cholesky import psd_safe_cholesky
 from linear_operator.utils.errors import NanError, NotPSDError
 from torch import Tensor
-from torch.nn.functional import pad
 
-BETA = 1.0
-"""Weight of the variance in UCB (section 6 of the paper)."""
 LEAST_NOISE = 1e-4
 """Variance; the smallest with which no Cholesky factorisation failed in float64."""
 FIT_ITERATIONS = 25
 """Of L-BFGS; with 22 trials in 48 dimensions the chosen controller no longer changes after 15."""
-BLOCK = 50
-"""Candidates predicted jointly."""
-RESTARTS, RAW_SAMPLES = 5, 256
+_LEAST_VARIANCE = 1e-12
+_NOTHING, _ONE = torch.tensor(0.0), torch.tensor(1.0)
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Surrogate:
-    """A Gaussian process ready to predict.
+@runtime_checkable
+class Surrogate(Protocol):
+    """A belief about f."""
+
+    def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
+        ...
+
+
+Fit = Callable[[Tensor, Tensor], Surrogate]
+"""From the features [n, k] and objectives [n] of the trials to what is expected elsewhere."""
+
+
+class Process:
+    r"""A fitted process: \mu = m + k^T K^{-1} (f - m), \sigma^2 = k_0 - k^T K^{-1} k, K with its noise.
+
+    Each controller on its own, where BoTorch's posterior would predict them jointly, ten times slower.
 
     Attributes:
-        model: The process, in evaluation mode.
+        model: Its mean, kernel, noise and trials.
         event: Empty, or what went wrong while fitting and which hyper-parameters stand in.
     """
 
-    model: SingleTaskGP
-    event: str = ""
+    def __init__(
+        self, model: SingleTaskGP, event: str = "", offset: Tensor = _NOTHING, factor: Tensor = _ONE
+    ) -> None:
+        """Conditions a model on its trials; the units of f are offset + factor times those of the model."""
+        self.model = model.eval().requires_grad_(requires_grad=False)
+        self.event = event
+        self._offset, self._unit = offset, factor
+        (self._trials,) = model.train_inputs
+        matrix = model.covar_module(self._trials).to_dense()
+        self._factor = psd_safe_cholesky(matrix + model.likelihood.noise * torch.eye(len(matrix)).to(matrix))
+        self._mean = model.mean_module.constant
+        residual = (model.train_targets - self._mean).unsqueeze(-1)
+        self._weights = torch.cholesky_solve(residual, self._factor)
+
+    def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
+        k = self.model.covar_module(phi, self._trials).to_dense()
+        k_0 = self.model.covar_module(phi, diag=True)
+        mu = self._mean + (k @ self._weights).squeeze(-1)
+        explained = torch.linalg.solve_triangular(self._factor, k.mT, upper=False).square().sum(dim=-2)
+        sigma = (k_0 - explained).clamp_min(_LEAST_VARIANCE).sqrt()
+        return self._offset + self._unit * mu, self._unit * sigma
 
 
 def scaled(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
@@ -62,7 +89,7 @@ def scaled(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor,
     return (f - low) / (high - low)
 
 
-def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> Surrogate:
+def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> Process:
     """Hyper-parameters of maximum marginal likelihood, and the process with them conditioned on all trials.
 
     Where a fit fails, the last good hyper-parameters serve: those fitted to the longest beginning of the
@@ -87,47 +114,7 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
         break
     if event:
         _log.warning(event)
-    return Surrogate(process.eval(), event)
-
-
-def ucb(model: SingleTaskGP, phi: Float[Tensor, "n k"]) -> Float[Tensor, " n"]:
-    r"""UCB(x) = \mu(x) + \sqrt\beta \sigma(x) with beta = 1, the root as in BoTorch."""
-    # BoTorch's own class predicts every candidate as a batch of one: the same numbers, ten times slower.
-    blocks = pad(phi, (0, 0, 0, -len(phi) % BLOCK)).reshape(-1, BLOCK, phi.shape[1])
-    with torch.no_grad():
-        posterior = model.posterior(blocks)
-        mu, sigma = posterior.mean.flatten(), posterior.variance.sqrt().flatten()
-    return (mu + BETA**0.5 * sigma)[: len(phi)]
-
-
-def maximise_log_ei(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Float[Tensor, " D"]:
-    """The maximum in the unit cube of log expected improvement under BoTorch's default process.
-
-    What a practitioner writes today, untouched: dimension-scaled priors, standardised objective, multi-start
-    gradient search.
-    """
-    model = SingleTaskGP(x, f[:, None])
-    try:
-        fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
-    except ModelFittingError as error:
-        _log.warning("hyper-parameters keep their prior modes: %s", error)
-    bounds = torch.stack([torch.zeros(x.shape[1]), torch.ones(x.shape[1])]).to(x)
-    best, _ = optimize_acqf(
-        LogExpectedImprovement(model.eval(), best_f=f.max()),
-        bounds,
-        q=1,
-        num_restarts=RESTARTS,
-        raw_samples=RAW_SAMPLES,
-    )
-    return best[0].detach()
-
-
-@contextmanager
-def torch_randomness(rng: np.random.Generator) -> Iterator[None]:
-    """Inside, torch draws from `rng`; afterwards, its global state is what it was."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(int(rng.integers(2**63)))
-        yield
+    return Process(process, event)
 
 
 def _process(kernel: Kernel, phi: Tensor, f: Tensor) -> SingleTaskGP:

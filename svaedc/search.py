@@ -1,0 +1,134 @@
+"""Where the acquisition is largest: among the candidates of a pool, or anywhere, by gradients."""
+
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final, Protocol, runtime_checkable
+
+import numpy as np
+import torch
+from botorch.acquisition.acquisition import AcquisitionFunction
+from botorch.models.deterministic import GenericDeterministicModel
+from botorch.optim.optimize import optimize_acqf
+from jaxtyping import Float32
+from torch import Tensor
+
+from svaedc.candidates import Candidates
+from svaedc.history import History
+
+RESTARTS: Final = 5
+RAW_SAMPLES: Final = 256
+"""Points that `optimize_acqf` draws, to start from the most promising ones."""
+ITERATIONS: Final = 50
+"""Of L-BFGS from each of them."""
+DRAWS: Final = 64
+"""Random controllers from which the first allowed one is taken."""
+_PENALTY: Final = 1e3
+"""Per unit of predicted badness beyond what is allowed; acquisitions are of the order of 1."""
+_TOLERANCE: Final = 1e-2
+
+Value = Callable[[Tensor], Tensor]
+"""The acquisition [*batch, n] at features [*batch, n, k], each on its own."""
+
+
+@runtime_checkable
+class Search(Protocol):
+    """A way to maximise an acquisition; every method works with every one."""
+
+    def anywhere(
+        self, candidates: Candidates, history: History, rng: np.random.Generator
+    ) -> Float32[np.ndarray, " D"]:
+        """A controller for a trial before which nothing is known."""
+        ...
+
+    def maximise(
+        self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
+    ) -> Float32[np.ndarray, " D"]:
+        """The controller of largest value that is worth a trial."""
+        ...
+
+
+class OverPool:
+    """Search among the candidates, whose features are known."""
+
+    def anywhere(
+        self, candidates: Candidates, history: History, rng: np.random.Generator
+    ) -> Float32[np.ndarray, " D"]:
+        """A uniform draw from the candidates no trial was spent on."""
+        return candidates.x[rng.choice(candidates.untried(history))].copy()
+
+    def maximise(
+        self,
+        value: Value,
+        candidates: Candidates,
+        history: History,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> Float32[np.ndarray, " D"]:
+        """The untried candidate of largest value."""
+        untried = candidates.untried(history)
+        with torch.no_grad():
+            best = value(candidates.phi[untried]).argmax()
+        return candidates.x[untried[best]].copy()
+
+
+class ByGradient:
+    """BoTorch's `optimize_acqf`: multi-start gradient search between the candidates' bounds."""
+
+    def anywhere(
+        self,
+        candidates: Candidates,
+        history: History,  # noqa: ARG002
+        rng: np.random.Generator,
+    ) -> Float32[np.ndarray, " D"]:
+        """A uniform draw between the bounds, of the controllers that are not predicted too bad."""
+        low, high = candidates.low.numpy(), candidates.high.numpy()
+        x = (low + (high - low) * rng.random((DRAWS, len(low)))).astype(np.float32)
+        with torch.no_grad():
+            first_allowed = candidates.excess(torch.tensor(x).double()).argmin()
+        return x[first_allowed]
+
+    def maximise(
+        self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
+    ) -> Float32[np.ndarray, " D"]:
+        """The controller of largest value, or a random one where that was tried already.
+
+        A trial under the same physics would repeat its outcome, and one that failed taught the surrogate
+        nothing: it would be asked for again and again.
+        """
+        with torch_randomness(rng), warnings.catch_warnings():
+            # A flat acquisition, as after equal outcomes, makes BoTorch warn of every starting point.
+            warnings.simplefilter("ignore")
+            best, _ = optimize_acqf(
+                _OnControllers(value, candidates),
+                torch.stack([candidates.low, candidates.high]),
+                q=1,
+                num_restarts=RESTARTS,
+                raw_samples=RAW_SAMPLES,
+                options={"maxiter": ITERATIONS},
+            )
+        x = best[0].numpy().astype(np.float32)
+        forbidden = float(candidates.excess(best).detach()) > _TOLERANCE
+        repeated = (history.tried.astype(np.float32) == x).all(axis=1).any()
+        return self.anywhere(candidates, history, rng) if forbidden or repeated else x
+
+
+class _OnControllers(AcquisitionFunction):
+    """The acquisition as a function of controllers, with a wall around those predicted too bad."""
+
+    def __init__(self, value: Value, candidates: Candidates) -> None:
+        super().__init__(model=GenericDeterministicModel(candidates.features_of))
+        self.value = value
+        self.candidates = candidates
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Values [b] of controllers [b, 1, D], as BoTorch calls it."""
+        x = x.squeeze(-2)
+        return self.value(self.candidates.features_of(x)) - _PENALTY * self.candidates.excess(x)
+
+
+@contextmanager
+def torch_randomness(rng: np.random.Generator) -> Iterator[None]:
+    """Inside, torch draws from `rng`; afterwards, its global state is what it was."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(rng.integers(2**63)))
+        yield

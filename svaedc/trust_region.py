@@ -1,0 +1,88 @@
+"""The box that TuRBO searches: it grows with success, shrinks with failure, and follows from the history."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+FIRST_LENGTH: Final = 0.8
+LARGEST_LENGTH: Final = 1.6
+SMALLEST_LENGTH: Final = 0.5**7
+"""Sides of the box before weighting (Eriksson et al., NeurIPS 2019); below the smallest it starts anew."""
+SUCCESSES: Final = 3
+"""In a row, after which the box doubles."""
+RANDOM_TRIALS: Final = 2
+"""At the start of every box, as at the start of a run."""
+_LEAST_GAIN: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class TrustRegion:
+    """State of TuRBO-1.
+
+    Attributes:
+        dimensions: D.
+        first: Trial the box began with; earlier ones are forgotten.
+        trials: Trials since then.
+        length: Side of the box.
+        best: Largest objective since then.
+        successes: Improvements in a row.
+        failures: Trials without one in a row.
+    """
+
+    dimensions: int
+    first: int = 0
+    trials: int = 0
+    length: float = FIRST_LENGTH
+    best: float = -math.inf
+    successes: int = 0
+    failures: int = 0
+
+    @classmethod
+    def after(cls, f: Sequence[float], dimensions: int) -> "TrustRegion":
+        """The state that a run with these objectives has led to; trials without one change nothing."""
+        state = cls(dimensions)
+        for each in f:
+            state = state.then(each)
+        return state
+
+    @property
+    def failures_allowed(self) -> int:
+        """In a row, before the box halves."""
+        return max(4, self.dimensions)
+
+    @property
+    def begins(self) -> bool:
+        """Whether the next trial is one of the random ones."""
+        return self.trials < RANDOM_TRIALS
+
+    def then(self, f: float) -> "TrustRegion":
+        """The state after one more objective."""
+        counted = replace(self, trials=self.trials + 1, best=max(self.best, f))
+        if self.begins:
+            return counted
+        if f > self.best + _LEAST_GAIN * abs(self.best):
+            return replace(counted, successes=self.successes + 1, failures=0)._resized()
+        return replace(counted, successes=0, failures=self.failures + 1)._resized()
+
+    def box(
+        self, centre: Float[Tensor, " D"], lengthscales: Float[Tensor, " D"]
+    ) -> tuple[Float[Tensor, " D"], Float[Tensor, " D"]]:
+        """Lower and upper corner, within the unit cube: longer where f changes slowly, of the same volume."""
+        weights = lengthscales / torch.exp(lengthscales.log().mean())
+        return (centre - weights * self.length / 2).clamp(0, 1), (centre + weights * self.length / 2).clamp(
+            0, 1
+        )
+
+    def _resized(self) -> "TrustRegion":
+        if self.successes >= SUCCESSES:
+            return replace(self, length=min(2 * self.length, LARGEST_LENGTH), successes=0)
+        if self.failures < self.failures_allowed:
+            return self
+        if self.length / 2 < SMALLEST_LENGTH:
+            return TrustRegion(self.dimensions, first=self.first + self.trials)
+        return replace(self, length=self.length / 2, failures=0)
