@@ -1,11 +1,15 @@
 """Setups by name: an environment, a controller and a task that belong together."""
 
 import difflib
+import hashlib
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
+from typing import Any, cast
 
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
@@ -44,6 +48,7 @@ class Setup:
         objective_limits: the range of f, fixed; BO scales f by it.
         success: an episode with f above this succeeded.
         stop: ends an episode early; of stand-ins for hardware only.
+        code: SHA-256 of the file of a user's module; "" for the setups that ship.
     """
 
     name: str
@@ -58,6 +63,7 @@ class Setup:
     objective_limits: tuple[float, float]
     success: float
     stop: StopRule = never
+    code: str = ""
 
     @property
     def dimensions(self) -> int:
@@ -117,7 +123,7 @@ def load(name: str) -> Setup:
         raise LookupError(
             f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
         )
-    return replace(made, name=name)
+    return replace(made, name=name, code=file_digest(imported(name)))
 
 
 def imported(name: str) -> ModuleType:
@@ -129,6 +135,11 @@ def imported(name: str) -> ModuleType:
             f"cannot import the module {name!r}: {error}; it must be in the working directory or on "
             "PYTHONPATH, on every machine of the cluster"
         ) from error
+
+
+def file_digest(part: object) -> str:
+    """SHA-256 of the file that defines a module or function."""
+    return hashlib.sha256(Path(inspect.getfile(cast(Any, part))).read_bytes()).hexdigest()
 
 
 def _is_module(name: str) -> bool:

@@ -38,6 +38,7 @@ class Identity:
         bad_kind: `bits`, one per condition and step, or `graded`, a degree per step.
         bad_name: `module:function` of a user's G_bad; "" for the setup's own.
         bad_digest: SHA-256 of the file that defines it.
+        setup_digest: SHA-256 of the file of a user's setup; "" for those that ship.
     """
 
     setup: str
@@ -57,6 +58,7 @@ class Identity:
     bad_kind: str = "bits"
     bad_name: str = ""
     bad_digest: str = ""
+    setup_digest: str = ""
 
     def __post_init__(self) -> None:
         """Refuse shards without episodes, and controllers without them."""
@@ -122,6 +124,7 @@ def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: in
         bad_kind="graded" if setup.task.graded else "bits",
         bad_name=setup.task.bad_name,
         bad_digest=setup.task.bad_digest,
+        setup_digest=setup.code,
     )
 
 

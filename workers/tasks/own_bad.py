@@ -8,18 +8,16 @@ Example, in a module `gentle.py`, for `svaedc collect --setup franka --bad gentl
 """
 
 import difflib
-import hashlib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float32
 
 from workers.environments.environment import Observed
-from workers.setups import Setup, imported
+from workers.setups import Setup, file_digest, imported
 from workers.tasks.task import Bad, Task
 
 Function = Callable[[Observed], Any]
@@ -127,7 +125,7 @@ def with_bad(setup: Setup, name: str) -> Setup:
             task=setup.task,
             function=function,
             bad_name=name,
-            bad_digest=hashlib.sha256(Path(inspect.getfile(function)).read_bytes()).hexdigest(),
+            bad_digest=file_digest(function),
             conditions=marked or (function.__name__,),
             graded=not marked,
         ),
