@@ -45,6 +45,8 @@ class RaySettings(Section):
     """Bytes of shared memory for objects; results here are small, so little is needed."""
     temporary_folder: UserPath = Path("/tmp/ray")
     """Sockets and logs; short, because a socket's whole path may have 107 characters."""
+    log_file_bytes: int = Field(default=20_000_000, ge=100_000)
+    """Bytes after which a process of Ray begins its log anew; the full one before it is kept."""
     connect_timeout_seconds: PositiveFloat = 5.0
     """How long a running cluster has to accept a connection."""
 

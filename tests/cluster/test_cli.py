@@ -22,6 +22,7 @@ def svaedc(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
 COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
 
 
@@ -61,6 +62,9 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
         (("dataset", "verify", "nowhere"), 1, "nowhere holds no dataset"),
         (("hardware", "status", "nowhere"), 1, "nowhere"),
         (("collect",), 2, "Missing option"),
+        # That nothing answers there would be found out first, if Ray were started before the refusal.
+        ((*COMPARE, "--methods", ","), 2, "--methods must name at least one of bbk-kl, botorch"),
+        ((*COMPARE, "--methods", "se,svae"), 2, "svae need a trained model: name its folder with --model"),
     ],
 )
 def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
@@ -90,7 +94,7 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     result = svaedc("dataset", "verify", str(broken), folder=tmp_path)
     assert result.returncode == 1
     assert victim.name in result.stdout
-    assert "recomputes exactly those episodes" in result.stderr
+    assert f"`svaedc dataset repair {broken}` recomputes what is broken" in result.stderr
 
 
 def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
@@ -108,7 +112,9 @@ def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
 def test_a_gap_is_told_from_damage_and_condemns_no_file(small_dataset, tmp_path):
     gappy = tmp_path / "gappy"
     shutil.copytree(small_dataset, gappy)
-    min(gappy.glob("*.parquet")).unlink()
+    first = min(gappy.glob("*.parquet"))
+    first.unlink()
+    first.with_name(f"{first.name}.sha256").unlink()
     result = svaedc("dataset", "verify", str(gappy), folder=tmp_path)
     assert result.returncode == 1
     assert result.stdout == "episodes 0 to 7 are not collected yet\n"

@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from base64 import b64encode
 from contextlib import closing
 from pathlib import Path
 
@@ -17,12 +18,13 @@ import pytest
 import torch
 
 from cluster import figures
-from cluster.compare import Grid, compare
+from cluster.compare import compare
 from cluster.comparison_folder import alone_in
 from cluster.comparison_job import evaluation
 from cluster.comparison_runs import Standing
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
+from cluster.grid import Grid
 from cluster.results import RunKey, append, recorded
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
@@ -112,6 +114,10 @@ def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, t
     assert summary["trials"] == 4
     assert (out / "figure.png").stat().st_size > 10_000
     assert (out / "figure.svg").read_text().count("<path") > 10
+    report = (out / "report.html").read_text()
+    for shown in ("tuning seeds", "screened-random", "pool_size", "version of botorch", "MLflow run"):
+        assert shown in report
+    assert b64encode((out / "figure.svg").read_bytes()).decode() in report
     [parent], children = mlflow_runs(tracking_settings)
     assert {run.data.tags["mlflow.parentRunId"] for run in children} == {parent.info.run_id}
     assert len(children) == 6
@@ -302,11 +308,20 @@ def test_unknown_names_are_refused_with_the_nearest(compared):
 
 @pytest.mark.parametrize(
     ("methods", "message"),
-    [((), "at least one of botorch, .*, got none"), (("se", "se"), "once, got se, se")],
+    [((), "at least one of bbk-kl, .*, got none"), (("se", "se"), "once, got se, se")],
 )
 def test_a_grid_names_every_method_once_and_at_least_one(methods, message):
     with pytest.raises(UsageError, match=message):
         Grid(methods, seed=0, runs=1)
+
+
+def test_runs_for_tuning_and_runs_for_reporting_share_no_folder(compared, tmp_path):
+    (tmp_path / "out" / "runs").mkdir(parents=True)
+    append(RunKey("random", 3).path(tmp_path / "out"), trial(0))
+    with pytest.raises(UserError, match=r"another purpose; choose another folder with --out: .* 3 to 1001"):
+        compared("random")
+    with pytest.raises(UsageError, match=r"--seed and --runs: .* got 999 to 1000"):
+        Grid(("random",), seed=999, runs=2)
 
 
 def test_a_method_without_its_model_is_refused(compared):

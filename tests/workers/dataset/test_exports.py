@@ -20,15 +20,20 @@ def rows(dataset):
     return [columns for _, columns in dataset.batches()]
 
 
+def archive(path):
+    with np.load(path, allow_pickle=False) as opened:
+        return dict(opened)
+
+
 def joined(rows, name):
     return np.concatenate([getattr(columns, name) for columns in rows])
 
 
 def test_archives_hold_the_columns_and_what_their_axes_mean(dataset, rows, tmp_path):
     assert list(export_npz(dataset, tmp_path)) == dataset.shards()
-    opened = [np.load(path, allow_pickle=False) for path in sorted(tmp_path.glob("*.npz"))]
+    opened = [archive(path) for path in sorted(tmp_path.glob("*.npz"))]
     for name in ("episode", "x", "xi", "bad", "y", "f"):
-        exported = np.concatenate([archive[name] for archive in opened])
+        exported = np.concatenate([each[name] for each in opened])
         assert exported.dtype == joined(rows, name).dtype
         np.testing.assert_array_equal(exported, joined(rows, name))
     assert opened[0]["xi"].shape == (8, 3, 20)
