@@ -117,13 +117,20 @@ def load(name: str) -> Setup:
         LookupError: there is neither (it names the nearest), or the module is not as it must be.
     """
     if name in MODULES or not _is_module(name):
-        return import_module(MODULES[known(name, "setup", MODULES)]).setup()
+        return import_module(MODULES[_shipped(name)]).setup()
     made = getattr(imported(name), "setup", lambda: None)()
     if not isinstance(made, Setup):
         raise LookupError(
             f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
         )
     return replace(made, name=name, code=file_digest(imported(name)))
+
+
+def _shipped(name: str) -> str:
+    try:
+        return known(name, "setup", MODULES)
+    except LookupError as error:
+        raise LookupError(f"{error.args[0]}; nor is there a module of that name to import") from error
 
 
 def imported(name: str) -> ModuleType:
