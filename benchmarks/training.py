@@ -5,6 +5,7 @@ often. The last ratio has our loop as a process of Ray Train runs it, with its c
 """
 
 import argparse
+import math
 import os
 import statistics
 import tempfile
@@ -87,8 +88,11 @@ def plain(halves, preset):
 def under_ray(session, folder, updates):
     """CPU seconds per update of both stages' loop in a process of Ray Train, and of the joint one in this."""
     import ray.train
+    from ray.train import RunConfig, ScalingConfig
+    from ray.train.torch import TorchTrainer
 
-    from cluster.training_job import trained
+    from cluster.mailbox import mailbox
+    from cluster.training_job import TrainingJob, trained
 
     def worker(config):
         torch.set_num_threads(1)
