@@ -23,6 +23,7 @@ from cluster.options import (
     interruptible,
     settings_of,
     setup_of,
+    usage_errors,
 )
 from cluster.progress import say
 
@@ -168,17 +169,21 @@ def compare(
     """Run methods of Bayesian optimisation side by side in simulation, in parallel on Ray Tune.
 
     All methods of a seed share their random trials and the hidden physics. Report seeds below 1000; tune with
-    --seed 1000 and above. Writes trials.parquet, summary.json, figure.png and figure.svg.
+    --seed 1000 and above. Writes trials.parquet, summary.json, report.html, figure.png and figure.svg.
     """
-    from cluster.compare import Grid
     from cluster.compare import compare as run_compare
+    from cluster.grid import Grid
 
     settings, chosen = settings_of(config, overrides), setup_of(setup)
     names = tuple(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
+    grid = Grid(names, seed, runs)
+    grid.require(model)
+    with usage_errors():
+        chosen.gap(gap)
     with _services(settings, address) as (session, tracker):
         run_compare(
             setup=chosen,
-            grid=Grid(names, seed, runs),
+            grid=grid,
             trials=trials,
             gap=gap,
             model=model,

@@ -7,45 +7,24 @@ from typing import Any
 
 from cluster.comparison_folder import alone_in, claim
 from cluster.comparison_job import ComparisonJob
-from cluster.comparison_report import FIGURE, SUMMARY, lines, publish, summary_of
+from cluster.comparison_report import FIGURE, PAGE, SUMMARY, lines, publish, summary_of
 from cluster.comparison_runs import Standing, Watch, submit
 from cluster.comparison_tracking import Note, TrackedComparison, begin, note_in
 from cluster.config import CompareSettings
-from cluster.errors import UsageError, UserError
+from cluster.errors import UserError
+from cluster.grid import Grid
+from cluster.options import usage_errors
 from cluster.progress import ProgressLine, say
-from cluster.results import TABLE, RunKey, all_runs, recorded
+from cluster.results import TABLE, RunKey, all_runs, recorded, seeds_in
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
-from svaedc import checkpoint, methods
+from svaedc import checkpoint
 from svaedc.comparison import Trial
 from svaedc.summaries import Summary
 from workers.dataset.shards import sha256
 from workers.physics import ranges
 from workers.rollout import VERSION
 from workers.setups import Setup
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Which runs are asked for: every method with every seed."""
-
-    methods: tuple[str, ...]
-    seed: int
-    runs: int
-
-    def __post_init__(self) -> None:
-        """Refuse a grid without runs, and one that names a method twice."""
-        if not self.methods:
-            raise UsageError(f"--methods must name at least one of {', '.join(methods.names())}, got none")
-        if len(set(self.methods)) < len(self.methods):
-            raise UsageError(f"--methods must name each method once, got {', '.join(self.methods)}")
-        if self.runs < 1:
-            raise UsageError(f"--runs must be at least 1, got {self.runs}")
-
-    def keys(self) -> list[RunKey]:
-        """All runs; the methods of a seed follow each other, so that partial results compare."""
-        seeds = range(self.seed, self.seed + self.runs)
-        return [RunKey(method, run) for run in seeds for method in self.methods]
 
 
 @dataclass(frozen=True)
@@ -108,6 +87,7 @@ def compare(
     plan = _plan(setup, grid, trials, gap, model, folder, settings)
     session.preflight(settings.slots)
     with alone_in(folder):
+        grid.require_purpose(folder, seeds_in(folder))
         parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
         note = note_in(folder, tracker)
         if _is_finished(plan, note):
@@ -116,7 +96,7 @@ def compare(
         tracked = begin(folder, tracker, f"compare {setup.name}", parameters)
         with tracked.run:
             _submit(plan, tracked)
-            return Comparison(_record(plan, setup, tracked), tracked.run.url)
+            return Comparison(_record(plan, setup, tracked, parameters), tracked.run.url)
 
 
 def _plan(
@@ -128,14 +108,10 @@ def _plan(
     folder: Path,
     settings: CompareSettings,
 ) -> _Plan:
-    try:
+    with usage_errors():
         setup.gap(gap)
-        with_model = [name for name in grid.methods if methods.needs_model(name)]
-    except (LookupError, ValueError) as error:
-        raise UsageError(error.args[0]) from error
-    if with_model and model is None:
-        raise UsageError(f"{', '.join(with_model)} need a trained model: name its folder with --model")
-    path = _checkpoint(model, setup) if with_model and model else None
+    grid.require(model)
+    path = _checkpoint(model, setup) if grid.with_model() and model else None
     level = str(ranges(gap)) if "=" in gap else gap  # so that equal ranges are one comparison
     job = ComparisonJob(
         folder=folder.resolve(),
@@ -170,7 +146,7 @@ def _is_finished(plan: _Plan, note: Note) -> bool:
     """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
     folder, runs = plan.job.folder, dict(all_runs(plan.job.folder))
     whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
-    return whole and all((folder / name).exists() for name in (TABLE, SUMMARY, FIGURE))
+    return whole and all((folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
 
 
 def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
@@ -191,13 +167,13 @@ def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
         submit(plan.job, missing, plan.slots, Watch(progress, standing, ended))
 
 
-def _record(plan: _Plan, setup: Setup, tracked: TrackedComparison) -> Summary:
+def _record(plan: _Plan, setup: Setup, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
     runs = list(all_runs(plan.job.folder))
     summary = summary_of(plan.job, runs)
-    report = publish(plan.job, setup, runs, summary)
+    report = publish(plan.job, setup, runs, summary, {**parameters, "MLflow run": tracked.run.url})
     for line in lines(summary):
         say(line)
-    say(f"{plan.job.folder / FIGURE}; {tracked.run.url}")
+    say(f"{plan.job.folder / PAGE}; {tracked.run.url}")
     asked = set(plan.grid.keys())
     for key, trials in runs:
         if key in asked:

@@ -14,6 +14,7 @@ from ray import tune
 
 from cluster.results import RunKey, append, recorded
 from svaedc import checkpoint, methods
+from svaedc.adjustment import Adjustable
 from svaedc.candidates import Problem
 from svaedc.comparison import Outcome, Trial, trials
 from svaedc.densities import Densities
@@ -78,7 +79,9 @@ class ComparisonJob:
             return Problem(setup.dimensions, setup.objective_limits, pool)
         model = _model(self.model)
         latents = Latents.of(torch.from_numpy(pool), model.latent_means)
-        return Problem(setup.dimensions, setup.objective_limits, pool, latents, Densities.of(model))
+        return Problem(
+            setup.dimensions, setup.objective_limits, pool, latents, Densities.of(model), Adjustable(model)
+        )
 
 
 def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:

@@ -1,14 +1,17 @@
 """What people read of a comparison: a table, a summary and a figure."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from cluster import figures
 from cluster.comparison_folder import writing
 from cluster.comparison_job import ComparisonJob
 from cluster.files import replacing
+from cluster.page import page
 from cluster.results import Runs, rows, write_table
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Summary
@@ -17,6 +20,8 @@ from workers.setups import Setup
 
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
+PAGE = "report.html"
+_VERSIONS = ("svaedc", "torch", "gpytorch", "botorch", "numpy", "pybullet", "ray")
 
 
 @dataclass(frozen=True)
@@ -32,13 +37,23 @@ def summary_of(job: ComparisonJob, runs: Runs) -> Summary:
     return summarise(rows(runs), Reporting(initial=job.initial), generator(0, "bootstrap", 0))
 
 
-def publish(job: ComparisonJob, setup: Setup, runs: Runs, summary: Summary) -> Report:
+def publish(
+    job: ComparisonJob, setup: Setup, runs: Runs, summary: Summary, settings: Mapping[str, Any]
+) -> Report:
     """Write what people read; each file is whole, or as it was before.
+
+    Args:
+        job: what all runs share.
+        setup: whose objective was maximised.
+        runs: all trials.
+        summary: of them.
+        settings: that the comparison was made with, for the page.
 
     Raises:
         UserError: the disk is full.
     """
     path = job.folder / SUMMARY
+    title = f"{job.setup}: Bayesian optimisation under hidden physics ({job.gap} gap)"
     with writing(job.folder):
         table = write_table(job.folder, runs, setup=job.setup, gap=job.gap)
         with replacing(path) as unfinished:
@@ -46,11 +61,15 @@ def publish(job: ComparisonJob, setup: Setup, runs: Runs, summary: Summary) -> R
         drawn = figures.best_so_far(
             job.folder / FIGURE,
             summary,
-            title=f"{job.setup}: Bayesian optimisation under hidden physics ({job.gap} gap)",
+            title=title,
             initial=job.initial,
             limits=setup.objective_limits,
         )
-    return Report((table, path), drawn)
+        versions = {f"version of {name}": version(name) for name in _VERSIONS}
+        written = page(title, summary, drawn[1:], job.initial, {**settings, **versions})
+        with replacing(job.folder / PAGE) as unfinished:
+            unfinished.write_text(written, encoding="utf-8")
+    return Report((table, path, job.folder / PAGE), drawn)
 
 
 def lines(summary: Summary) -> Iterator[str]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cluster.collect import collect
-from cluster.compare import Comparison, Grid, compare
+from cluster.compare import Comparison, compare
 from cluster.config import Settings
+from cluster.grid import Grid
 from cluster.placement import free_machines, place
 from cluster.progress import say, timed
 from cluster.session import Session

@@ -31,9 +31,19 @@ _STYLES = {
     "screened-svae": ("#aa4499", "<", "-"),
     "svae-dc": ("#d55e00", "*", "-"),
     "svae-dc-whitened": ("#009e73", "P", "-"),
+    "svae-dc-online": ("#117733", "8", "-"),
+    "svae-dc-sigmoid": ("#a6761d", "p", "-"),
+    "svae-matern": ("#cc79a7", ">", "-."),
+    "svae-dc-matern": ("#d55e00", "h", "-."),
+    "bbk-kl": ("#666633", "1", "-"),
+    "lkl": ("#b2a300", "2", "-"),
+    "se-acqf": ("#0072b2", "d", ":"),
+    "matern-acqf": ("#56b4e9", "H", ":"),
+    "turbo": ("#661100", "x", "--"),
+    "saasbo": ("#332288", "+", "--"),
 }
 """Colour (Okabe and Ito's, which colour-blind people can tell apart), marker and line of each method: dotted
-without a model of f, dashed on controllers, solid on latent paths."""
+without a model of f, dashed on controllers, solid on latent paths; a variant shares its colour."""
 _OTHER_STYLE = ("#000000", "d", "-.")
 
 

@@ -85,8 +85,8 @@ def interruptible() -> Iterator[None]:
 
 @contextmanager
 def usage_errors() -> Iterator[None]:
-    """Turns an unknown name into a usage error with the same message."""
+    """Turns an unknown name or an impossible value into a usage error with the same message."""
     try:
         yield
-    except LookupError as error:
+    except (LookupError, ValueError) as error:
         raise UsageError(error.args[0]) from error

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,10 +20,10 @@ SHORTEST, LONGEST = 5.0, 8.0  # s of a clip whose speed nobody chose
 
 @dataclass(frozen=True)
 class Moment:
-    """One picture: the step it shows, and the bits of the bad conditions written on it."""
+    """One picture: the step it shows, and the bad conditions written on it."""
 
     step: int
-    bits: int
+    conditions: tuple[str, ...]
 
 
 def usual_speed(setup: Setup) -> float:
@@ -51,14 +52,15 @@ def clip(setup: Setup, episode: Episode, speed: float, rate: int) -> list[Moment
         )
     count = max(1, round(setup.horizon * slowest / speed))
     edges = np.rint(np.linspace(0, setup.horizon, count + 1)).astype(int)
-    bits = np.bitwise_or.reduceat(episode.bad, edges[:-1])
-    return [Moment(int(stop) - 1, int(held)) for stop, held in zip(edges[1:], bits, strict=True)]
+    return [
+        Moment(stop - 1, held(setup, episode.bad[start:stop])) for start, stop in pairwise(edges.tolist())
+    ]
 
 
 def stills(setup: Setup, episode: Episode, count: int) -> list[Moment]:
     """Moments evenly over an episode, its first and last step among them; each tells what holds just then."""
-    steps = np.rint(np.linspace(0, setup.horizon - 1, count)).astype(int)
-    return [Moment(int(step), int(episode.bad[step])) for step in steps]
+    steps = np.rint(np.linspace(0, setup.horizon - 1, count)).astype(int).tolist()
+    return [Moment(step, held(setup, episode.bad[step : step + 1])) for step in steps]
 
 
 def pictures(
@@ -70,18 +72,22 @@ def pictures(
     with ProgressLine("pictures", len(steps), 0) as progress:
         for moment, picture in zip(moments, drawn, strict=True):
             corner = f"{(moment.step + 1) * setup.control_step:.2f} s"
-            yield captioned(picture, corner, note, conditions(setup, moment.bits))
+            yield captioned(picture, corner, note, moment.conditions)
             progress.advance(1, "")
 
 
-def conditions(setup: Setup, bits: int) -> tuple[str, ...]:
-    """Names of the bad conditions whose bits are set."""
+def held(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
+    """The bad conditions that hold in any of some steps; a graded one with its greatest degree."""
+    if bad.dtype == np.float32:
+        degree = float(bad.max())
+        return (f"{setup.conditions[0]} {degree:.0%}",) if degree > 0.0 else ()
+    bits = int(np.bitwise_or.reduce(bad))
     return tuple(name for number, name in enumerate(setup.conditions) if bits >> number & 1)
 
 
 def summary(setup: Setup, episode: Episode) -> str:
     """One line: objective, badness, which conditions made it, and why the episode stopped."""
-    reasons = conditions(setup, int(np.bitwise_or.reduce(episode.bad)))
+    reasons = held(setup, episode.bad)
     stopped = f"; stopped: {episode.stop}" if episode.stop else ""
     because = f" ({', '.join(reasons)})" if reasons else ""
-    return f"{setup.name}: objective {episode.f:+.3g}, {episode.y:.0%} of the steps bad{because}{stopped}"
+    return f"{setup.name}: objective {episode.f:+.3g}, badness {episode.y:.2f}{because}{stopped}"

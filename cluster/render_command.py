@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cluster.errors import UsageError
-from cluster.options import SetupName, durable, setup_of
+from cluster.options import SetupName, durable, setup_of, usage_errors
 from cluster.progress import say
 
 X_HELP = "random:SEED, dataset:FOLDER:INDEX, an .npy file, or D numbers in [0, 1] separated by commas."
@@ -45,7 +45,7 @@ def render(
     from cluster.film import STILLS, require_writable, write
     from cluster.render import clip, pictures, summary, usual_speed
     from cluster.render import stills as chosen_stills
-    from workers.pictures import Size
+    from workers.pictures import Size, scenery_of
 
     robot = setup_of(setup)
     try:
@@ -53,6 +53,8 @@ def render(
     except ValueError as error:
         raise UsageError(f"{error}; change --width or --height") from error
     require_writable(out, width, height)
+    with usage_errors():
+        scenery_of(robot)
     pace = usual_speed(robot) if speed is None else speed
     episode = exhibit(x, robot, seed)
     if out.suffix in STILLS:

@@ -96,6 +96,11 @@ def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
         yield RunKey(method, int(run)), recorded(path)
 
 
+def seeds_in(folder: Path) -> set[int]:
+    """Of all runs that have begun."""
+    return {int(path.stem.rpartition("-")[2]) for path in (folder / RUNS).glob("*.jsonl")}
+
+
 def rows(runs: Runs) -> list[Row]:
     """What the statistics need of every trial."""
     return [

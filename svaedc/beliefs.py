@@ -10,6 +10,7 @@ from gpytorch.kernels import Kernel
 from torch import Tensor
 
 from svaedc import baselines, kernels
+from svaedc.adjustment import AdjustedPaths
 from svaedc.candidates import Candidates, Problem, as_they_are, by_density, by_latents, in_the_cube
 from svaedc.densities import Density
 from svaedc.features import Sigmoid, Whitened, svae, svae_dc
@@ -79,6 +80,17 @@ def on_screened_paths(kernel: KernelOf, problem: Problem) -> Belief:
     return on_paths(kernel, problem.least_bad(LEAST_BAD))
 
 
+def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers."""
+    start, adjustable = Sigmoid(), problem.known_adjustable()
+    trained = by_latents(problem, start)
+
+    def adjusted() -> Kernel:
+        return kernels.Embedded(kernel(trained.phi.shape[1]), AdjustedPaths(adjustable, trained.unit, start))
+
+    return _kernel_belief(in_the_cube(problem), adjusted, problem)
+
+
 def on_trajectories(problem: Problem) -> Belief:
     """BBK-KL: the symmetrised KL between p(xi|x_i) and p(xi|x_j)."""
     return _on_density(problem.known_densities().xi, problem)
@@ -125,6 +137,7 @@ BELIEFS_OF_A_MODEL: Final[dict[str, Callable[[Problem], Belief]]] = {
     "svae-dc-matern": partial(on_compressed_paths, kernels.matern),
     "svae-dc-sigmoid": partial(on_sigmoid_paths, kernels.se),
     "svae-dc-whitened": partial(on_whitened_paths, kernels.se),
+    "svae-dc-online": partial(on_adjusted_paths, kernels.se),
     "screened-svae": partial(on_screened_paths, kernels.se),
     "bbk-kl": on_trajectories,
     "lkl": on_latent_distributions,

@@ -4,15 +4,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 import torch
 from jaxtyping import Float, Float32, Int
 from torch import Tensor
 
+from svaedc.adjustment import Adjustable
 from svaedc.densities import Densities, Density
 from svaedc.features import Embedding, Latents
 from svaedc.history import History
+
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +30,7 @@ class Problem:
             one.
         latents: What the frozen model says of the pool, for methods that need it.
         densities: Its distributions, for the KL kernels.
+        adjustable: The model itself, where its last layers are adjusted online.
         largest_y: Controllers predicted worse than this are out of bounds.
     """
 
@@ -34,6 +39,7 @@ class Problem:
     pool: Float32[np.ndarray, "n D"]
     latents: Latents | None = None
     densities: Densities | None = None
+    adjustable: Adjustable | None = None
     largest_y: float = 1.0
 
     def __post_init__(self) -> None:
@@ -51,29 +57,16 @@ class Problem:
             )
 
     def known_latents(self) -> Latents:
-        """The latents.
-
-        Raises:
-            ValueError: There are none.
-        """
-        if self.latents is None:
-            raise ValueError(
-                "latents must be those of a trained model, got None: "
-                "train one and pass Latents.of(pool, model.latent_means)"
-            )
-        return self.latents
+        """The latents; without them, a `ValueError`."""
+        return _known(self.latents, "latents", "Latents.of(pool, model.latent_means)")
 
     def known_densities(self) -> Densities:
-        """The distributions.
+        """The distributions; without them, a `ValueError`."""
+        return _known(self.densities, "densities", "Densities.of(model)")
 
-        Raises:
-            ValueError: There are none.
-        """
-        if self.densities is None:
-            raise ValueError(
-                "densities must be those of a trained model, got None: train one and pass Densities.of(model)"
-            )
-        return self.densities
+    def known_adjustable(self) -> Adjustable:
+        """The model; without one, a `ValueError`."""
+        return _known(self.adjustable, "adjustable layers", "Adjustable(model)")
 
     def least_bad(self, share: float) -> "Problem":
         """The same problem with only this share of the pool, the controllers predicted least bad."""
@@ -172,6 +165,12 @@ def by_latents(problem: Problem, embedding: Embedding) -> Candidates:
 def by_density(problem: Problem, density: Density) -> Candidates:
     """The pool, compared by distributions, whose divergence has no unit: phi(x) = [location | log scale]."""
     return Candidates.unscaled(problem, density.rows)
+
+
+def _known(part: Part | None, name: str, made_by: str) -> Part:
+    if part is None:
+        raise ValueError(f"{name} must be those of a trained model, got None: train one and pass {made_by}")
+    return part
 
 
 def _identity(x: Tensor) -> Tensor:

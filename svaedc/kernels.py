@@ -1,5 +1,6 @@
 """How alike two controllers are: the paper's kernels over features, composed from GPyTorch's."""
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -48,7 +49,7 @@ def kl(divergence: Divergence, median: float) -> ScaleKernel:
     return _scaled(SymmetrisedKl(divergence, median))
 
 
-class Compressed(Kernel):
+def compressed(outer: Kernel, embedding: Embedding) -> "Embedded":
     r"""k(x_i, x_j) = k_0(phi(x_i), phi(x_j)) with phi(x) = (1 - \bar y_x) \bar\tau_x, equation (k_svae_dc).
 
     The whole formula over rows [tau | y]. With a pool that does not change, phi is computed once instead, and
@@ -56,18 +57,27 @@ class Compressed(Kernel):
 
     Args:
         outer: k_0, `se(...)` or `matern(...)`.
-        embedding: phi, for example `svae_dc`; its parameters are fitted with those of k_0 if it is a module.
+        embedding: phi, for example `svae_dc`.
+    """
+    return Embedded(outer, lambda rows: embedding(rows[..., :-1], rows[..., -1]))
+
+
+class Embedded(Kernel):
+    """k(x_i, x_j) = k_0(phi(x_i), phi(x_j)).
+
+    Args:
+        outer: k_0, `se(...)` or `matern(...)`.
+        phi: Features [..., n, k] of what the kernel is given; a module is fitted together with k_0.
     """
 
-    def __init__(self, outer: Kernel, embedding: Embedding) -> None:
+    def __init__(self, outer: Kernel, phi: Callable[[Tensor], Tensor]) -> None:
         super().__init__()
         self.outer = outer
-        self.embedding = embedding
+        self.phi = phi
 
     def forward(self, x1: Tensor, x2: Tensor, **params: Any) -> Any:
-        """The kernel matrix [..., n, m] of rows [..., n, k + 1] and [..., m, k + 1]."""
-        phi1, phi2 = (self.embedding(x[..., :-1], x[..., -1]) for x in (x1, x2))
-        return self.outer.forward(phi1, phi2, **params)
+        """The kernel matrix [..., n, m], as GPyTorch calls it."""
+        return self.outer.forward(self.phi(x1), self.phi(x2), **params)
 
 
 class SymmetrisedKl(Kernel):

@@ -65,17 +65,15 @@ def frames(
         size: of every picture.
 
     Raises:
-        ValueError: when ξ has other channels than the setup or is not finite, or there is nothing to see.
+        ValueError: when ξ has other channels than the setup or is not finite.
+        LookupError: when there is nothing to see.
     """
     if xi.shape[0] != len(setup.observation) or not np.isfinite(xi).all():
         raise ValueError(
             f"xi of {setup.name} must be {len(setup.observation)} channels × time of finite numbers, "
             f"got shape {xi.shape} with {np.count_nonzero(~np.isfinite(xi))} that are not finite"
         )
-    with setup.open() as environment:
-        scenery = environment.scenery
-    if scenery is None:
-        raise ValueError(f"{setup.name} has nothing to see; its environment declares no scenery")
+    scenery = scenery_of(setup)
     with Stage() as stage:
         show = Show(stage, scenery, setup.observation)
         targets = show.targets(xi, setup.control_step)
@@ -83,6 +81,15 @@ def frames(
         for step in steps:
             show.pose(xi[:, step], targets[:, step])
             yield stage.picture(scenery.camera, size.width, size.height)
+
+
+def scenery_of(setup: Setup) -> Scenery:
+    """What pictures of a setup show; a setup without anything to see raises `LookupError`."""
+    with setup.open() as environment:
+        scenery = environment.scenery
+    if scenery is None:
+        raise LookupError(f"{setup.name} has nothing to see: its environment declares no scenery")
+    return scenery
 
 
 class Show:

@@ -13,6 +13,7 @@ from cluster.errors import UserError
 from cluster.hardware.campaign import Suggest
 from cluster.hardware.identity import Identity
 from svaedc import checkpoint, methods
+from svaedc.adjustment import Adjustable
 from svaedc.candidates import Problem
 from svaedc.densities import Densities
 from svaedc.features import Latents
@@ -50,7 +51,8 @@ class Proposals:
         if methods.needs_model(identity.method):
             network = _network(identity, model)
             latents = Latents.of(torch.tensor(pool), network.latent_means)
-            problem = replace(problem, latents=latents, densities=Densities.of(network))
+            densities, adjustable = Densities.of(network), Adjustable(network)
+            problem = replace(problem, latents=latents, densities=densities, adjustable=adjustable)
         return cls(methods.build(identity.method, problem).suggest, problem.latents)
 
     def predicted_badness(self, x: Float[np.ndarray, " D"]) -> float | None:

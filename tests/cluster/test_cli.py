@@ -1,6 +1,7 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -21,6 +22,7 @@ def svaedc(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
 COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
 
 
@@ -60,6 +62,9 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
         (("dataset", "verify", "nowhere"), 1, "nowhere holds no dataset"),
         (("hardware", "status", "nowhere"), 1, "nowhere"),
         (("collect",), 2, "Missing option"),
+        # That nothing answers there would be found out first, if Ray were started before the refusal.
+        ((*COMPARE, "--methods", ","), 2, "--methods must name at least one of bbk-kl, botorch"),
+        ((*COMPARE, "--methods", "se,svae"), 2, "svae need a trained model: name its folder with --model"),
     ],
 )
 def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
@@ -74,6 +79,8 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     assert info.returncode == 0, info.stderr
     assert "16 in 2 shards" in info.stdout
     assert "object_tipped" in info.stdout
+    assert re.search(r"diverged +0\b", info.stdout)
+    assert re.search(r"stopped +0\b", info.stdout)
     assert svaedc("dataset", "verify", str(small_dataset), folder=tmp_path).returncode == 0
     broken = tmp_path / "broken"
     broken.mkdir()

@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from base64 import b64encode
 from contextlib import closing
 from pathlib import Path
 
@@ -17,12 +18,13 @@ import pytest
 import torch
 
 from cluster import figures
-from cluster.compare import Grid, compare
+from cluster.compare import compare
 from cluster.comparison_folder import alone_in
 from cluster.comparison_job import evaluation
 from cluster.comparison_runs import Standing
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
+from cluster.grid import Grid
 from cluster.results import RunKey, append, recorded
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
@@ -112,6 +114,10 @@ def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, t
     assert summary["trials"] == 4
     assert (out / "figure.png").stat().st_size > 10_000
     assert (out / "figure.svg").read_text().count("<path") > 10
+    report = (out / "report.html").read_text()
+    for shown in ("tuning seeds", "screened-random", "pool_size", "version of botorch", "MLflow run"):
+        assert shown in report
+    assert b64encode((out / "figure.svg").read_bytes()).decode() in report
     [parent], children = mlflow_runs(tracking_settings)
     assert {run.data.tags["mlflow.parentRunId"] for run in children} == {parent.info.run_id}
     assert len(children) == 6
@@ -256,8 +262,9 @@ def test_the_hidden_physics_belong_to_the_run_and_to_the_gap():
         def f(gap: str, run: int) -> float:
             return evaluation(setup, environment, gap, run)(x).f
 
-        found = [f(gap, run) for gap in ("paper", "training", "wide") for run in (1000, 1001)]
-        assert len(set(found)) == 6
+        gaps = ("object1_mass=1.9:2.1", "paper", "training", "wide")
+        found = [f(gap, run) for gap in gaps for run in (1000, 1001)]
+        assert len(set(found)) == 8
         assert f("wide", 1001) == found[-1]
 
 
@@ -265,6 +272,15 @@ def test_a_comparison_runs_under_the_gap_it_was_asked_for(compared, tmp_path):
     paper, wide = (table(compared("random", gap=gap, folder=tmp_path / gap)) for gap in ("paper", "wide"))
     assert [row["x"] for row in paper] == [row["x"] for row in wide]
     assert all(one["f"] != other["f"] for one, other in zip(paper, wide, strict=True))
+
+
+def test_an_explicit_gap_is_recorded_by_its_ranges_however_they_are_written(compared):
+    out = compared("random", gap="object2_mass=2,object1_friction=0.2:0.40", runs=1)
+    level = "object1_friction=0.2:0.4,object2_mass=2.0:2.0"
+    assert {row["gap"] for row in table(out)} == {level}
+    assert compared("random", gap=level, runs=1) == out
+    with pytest.raises(UserError, match="holds a comparison with gap"):
+        compared("random", gap="object2_mass=2.1", runs=1)
 
 
 def test_the_model_belongs_to_a_comparison_from_the_first_method_that_needs_one(compared, tmp_path):
@@ -284,15 +300,28 @@ def test_unknown_names_are_refused_with_the_nearest(compared):
         compared("svae-cd")
     with pytest.raises(UsageError, match="did you mean 'paper'"):
         compared(gap="papre")
+    with pytest.raises(UsageError, match="did you mean 'object1_mass'"):
+        compared(gap="object1_mas=2")
+    with pytest.raises(UsageError, match=r"object1_mass must satisfy 0 <= low <= high, got \[3.0, 2.0\]"):
+        compared(gap="object1_mass=3:2")
 
 
 @pytest.mark.parametrize(
     ("methods", "message"),
-    [((), "at least one of botorch, .*, got none"), (("se", "se"), "once, got se, se")],
+    [((), "at least one of bbk-kl, .*, got none"), (("se", "se"), "once, got se, se")],
 )
 def test_a_grid_names_every_method_once_and_at_least_one(methods, message):
     with pytest.raises(UsageError, match=message):
         Grid(methods, seed=0, runs=1)
+
+
+def test_runs_for_tuning_and_runs_for_reporting_share_no_folder(compared, tmp_path):
+    (tmp_path / "out" / "runs").mkdir(parents=True)
+    append(RunKey("random", 3).path(tmp_path / "out"), trial(0))
+    with pytest.raises(UserError, match=r"another purpose; choose another folder with --out: .* 3 to 1001"):
+        compared("random")
+    with pytest.raises(UsageError, match=r"--seed and --runs: .* got 999 to 1000"):
+        Grid(("random",), seed=999, runs=2)
 
 
 def test_a_method_without_its_model_is_refused(compared):

@@ -45,11 +45,9 @@ def test_a_clip_reaches_the_last_step_and_loses_no_bad_one(setup, episode):
     moments = clip(setup, episode, 0.05, 10)  # 60 steps of 2 ms in 24 pictures
     assert len(moments) == 24
     assert moments[-1].step == 59
-    assert np.bitwise_or.reduce([moment.bits for moment in moments]) == 0b111
-    edges = [-1, *(moment.step for moment in moments)]
-    for before, moment in zip(edges[:-1], moments, strict=True):
-        expected = set(episode.bad[before + 1 : moment.step + 1].tolist()) - {0}
-        assert moment.bits == sum(expected)
+    # Steps 11 to 16 are bad; the pictures around show 11, 14 and 17, the last one step after them.
+    assert [moment.step for moment in moments if moment.conditions] == [11, 14, 17, 59]
+    assert moments[-1].conditions == ("object_off_table", "hand_outside_workspace")
 
 
 def test_stills_show_the_first_and_last_step_and_what_holds_just_then(setup, episode):
@@ -57,7 +55,15 @@ def test_stills_show_the_first_and_last_step_and_what_holds_just_then(setup, epi
 
     moments = stills(setup, episode, 6)
     assert [moment.step for moment in moments] == [0, 12, 24, 35, 47, 59]
-    assert [moment.bits for moment in moments] == [0, 1, 0, 0, 0, 0b110]
+    last = ("object_off_table", "hand_outside_workspace")
+    assert [moment.conditions for moment in moments] == [(), ("object_tipped",), (), (), (), last]
+
+
+def test_a_graded_condition_is_shown_with_its_degree(setup):
+    from cluster.render import held
+
+    assert held(setup, np.array([0.0, 0.25, 0.1], dtype=np.float32)) == ("object_tipped 25%",)
+    assert held(setup, np.zeros(3, dtype=np.float32)) == ()
 
 
 @pytest.mark.parametrize(("seconds", "speed"), [(1.0, 0.2), (6.0, 1.0), (24.0, 3.0)])

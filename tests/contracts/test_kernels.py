@@ -40,7 +40,7 @@ def distributions(shape, seed):
 
 
 def compressed(outer, embedding):
-    return Case(lambda: kernels.Compressed(outer(K), embedding), paths_and_badness)
+    return Case(lambda: kernels.compressed(outer(K), embedding), paths_and_badness)
 
 
 WHITENED = Whitened(torch.tensor([0.5, 1.0, 2.0]).double(), worst=1.0, best=0.0)
@@ -103,7 +103,7 @@ def test_candidates_in_batches_meet_the_same_trials(case):
 @every_kernel
 def test_diagonal_is_the_output_scale(case):
     kernel, x = made(case), case.features((6,), 0)
-    scale = kernel.outer.outputscale if isinstance(kernel, kernels.Compressed) else kernel.outputscale
+    scale = kernel.outer.outputscale if isinstance(kernel, kernels.Embedded) else kernel.outputscale
     torch.testing.assert_close(kernel(x, diag=True), scale.expand(6))
     torch.testing.assert_close(
         dense(kernel, x, x.clone() + 1e-12).diagonal(), scale.detach().expand(6), atol=1e-5, rtol=0

@@ -13,6 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from workers import setups
+from workers.environments.environment import Observed
 from workers.gymnasium_environment import SetupEnvironment
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
@@ -115,6 +116,43 @@ def test_objectives_lie_within_their_limits_and_are_exact_in_float32(setup, epis
     for episode in episodes:
         assert np.float32(low) <= episode.f <= np.float32(high)
         assert episode.f == float(np.float32(episode.f))
+
+
+def test_a_push_or_walk_the_wanted_way_is_worth_more_than_the_other_way(setup, episodes):
+    """Franka pushes towards −y, the others towards +y; everything else stays as it was in the first step."""
+    y = [row for row, channel in enumerate(setup.observation) if channel.name in ("object1_y", "body_y")]
+    sign = -1.0 if setup.name.startswith("franka") else 1.0
+    with setup.open() as scene:
+        scene.reset(episodes[0].physics)
+        seen = scene.observed([scene.record()])
+        worth = [
+            setup.task.objective(_moved(seen, y, sign * 0.1 * way), np.zeros((8, 1), bool))
+            for way in (-1, 0, 1)
+        ]
+    scale = 10.0 if setup.name.startswith("daisy") else 1.0
+    assert np.diff(worth) == pytest.approx([0.1 * scale] * 2, abs=1e-5)
+
+
+def _moved(observed: Observed, rows: list[int], metres: float) -> Observed:
+    xi = observed.xi.copy()
+    xi[rows] += np.float32(metres)
+    return Observed(xi, observed.signals)
+
+
+def test_nothing_touches_but_what_stands_on_the_ground_at_the_start(setup, episodes):
+    """No condition is bad before the first command, and objects that nobody touches stay where they are."""
+    with setup.open() as scene:
+        scene.reset(episodes[0].physics)
+        seen = scene.observed([scene.record()])
+    assert not setup.task.is_bad(seen).any()
+    assert setup.stop(seen) == ""
+
+
+def test_angles_are_bounded_as_radians_are(setup):
+    """A joint turns less than twice around; in degrees its bounds would be tens to hundreds."""
+    for channel in (*setup.observation, *setup.controller.parameters):
+        if channel.unit == "rad":
+            assert max(abs(channel.low), abs(channel.high)) < 4 * np.pi, channel.name
 
 
 def test_different_controllers_move_differently(episodes):

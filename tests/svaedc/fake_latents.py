@@ -4,6 +4,7 @@ import numpy as np
 import torch
 
 from svaedc import divergences
+from svaedc.adjustment import Adjustable
 from svaedc.candidates import Problem
 from svaedc.densities import Densities, Density
 from svaedc.features import Latents
@@ -19,6 +20,19 @@ def latent_means(x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     )
 
 
+class FakeModel(torch.nn.Module):
+    """The same with a last layer that could be adjusted: tau = L tau(x) with L the identity."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.last = torch.nn.Linear(TAU_DIMENSIONS, TAU_DIMENSIONS, bias=False).requires_grad_(False)
+        self.last.weight.copy_(torch.eye(TAU_DIMENSIONS))
+
+    def latent_means(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        tau, y = latent_means(x)
+        return self.last(tau), y
+
+
 def rows(x: torch.Tensor) -> torch.Tensor:
     """[location | log scale]: located at tau, wider where x_1 is large."""
     tau = latent_means(x.double())[0]
@@ -30,7 +44,8 @@ def problem(dimensions: int, candidates: int, seed: int) -> Problem:
     pool = np.random.default_rng(seed).random((candidates, dimensions), dtype=np.float32)
     latents = Latents.of(torch.tensor(pool), latent_means)
     densities = Densities(tau=Density(rows, divergences.laplace), xi=Density(rows, divergences.gaussian))
-    return Problem(dimensions, (-1.0, 1.0), pool, latents, densities)
+    adjustable = Adjustable(FakeModel(), layers=("last.weight",))
+    return Problem(dimensions, (-1.0, 1.0), pool, latents, densities, adjustable)
 
 
 def quadratic(x: np.ndarray) -> float:

@@ -29,7 +29,7 @@ def x(franka):
     return generator(0, "controller", 0).random(franka.dimensions)
 
 
-@pytest.mark.parametrize("setup", ["franka", "yumi"])
+@pytest.mark.parametrize("setup", ["franka", "yumi", "daisy-11d"])
 def test_a_robot_is_found_by_name_and_names_its_setup(setup, tmp_path):
     robot = robots.find(f"{setup}-rehearsal")
     driver = robot.connect(0, 0.0, tmp_path)
@@ -37,7 +37,7 @@ def test_a_robot_is_found_by_name_and_names_its_setup(setup, tmp_path):
     assert (driver.name, driver.setup) == (robot.name, robot.setup) == (f"{setup}-rehearsal", setup)
 
 
-@pytest.mark.parametrize("name", ["franka-rehearsal", "yumi-rehearsal"])
+@pytest.mark.parametrize("name", sorted(robots.ROBOTS))
 def test_a_robot_moves_as_the_setup_of_its_own_name(name, tmp_path):
     setup = setups.load(name)
     x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)

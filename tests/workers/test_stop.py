@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from workers import setups
 from workers.environments.environment import Observed
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import generator
-from workers.rollout import random_episode
-from workers.tasks.stop import LOW, OUTSIDE, HandGuard, never
+from workers.rollout import random_episode, rollout
+from workers.tasks.stop import LOW, OFF_WALKWAY, OUTSIDE, TILTED, HandGuard, WalkGuard, never
+from workers.tasks.walk import Walk
 
 GUARD = HandGuard(x=(0.1, 0.8), y=(-0.5, 0.5), lowest=0.09)
 AT = 100  # control step
@@ -127,3 +129,59 @@ def test_gymnasium_terminates_where_a_rollout_stops_with_the_same_objective(setu
     assert terminated
     assert not truncated
     assert (reward, info["stop"]) == (pytest.approx(expected.f), expected.stop)
+
+
+def _body(x: float = 0.0, euler: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Observed:
+    """A walking robot in its last step, after a first one in which all was well."""
+    xi = np.zeros((27, 2), dtype=np.float32)
+    axes = Rotation.from_euler("xyz", euler, degrees=True).as_matrix()[:, :2].T.ravel()
+    xi[18], xi[21:, 0], xi[21:, 1] = (0.0, x), (1, 0, 0, 0, 1, 0), axes
+    return Observed(xi, {})
+
+
+@pytest.mark.parametrize(
+    ("seen", "reason"),
+    [
+        (_body(), ""),
+        (_body(0.49, (59, 0, 120)), ""),
+        (_body(-0.49, (0, -59, 0)), ""),
+        (_body(0.51), OFF_WALKWAY),
+        (_body(-0.51), OFF_WALKWAY),
+        (_body(float("nan")), OFF_WALKWAY),
+        (_body(0.0, (61, 0, 0)), TILTED),
+        (_body(0.0, (0, -61, 0)), TILTED),
+        (_body(0.9, (180, 0, 0)), TILTED),
+    ],
+)
+def test_the_walk_guard_stops_a_robot_that_leaves_the_walkway_or_falls(seen, reason):
+    """More than 0.5 m from the middle, or more than 60° of roll or pitch."""
+    assert WalkGuard(Walk(channel=18))(seen) == reason
+
+
+def test_a_stopped_walk_is_worth_what_was_walked_up_to_there():
+    """No fast step is counted after the stop, though the last one was fast."""
+    setup = setups.load("daisy-11d-rehearsal")
+    observed = _body()
+    observed.xi[19] = (1.0, 2.0)
+    speeds = np.zeros((18, 2))
+    speeds[3] = 11.0
+    signals = {"joint_speeds": speeds, "elbow_contact": np.zeros(2, dtype=bool)}
+    stopped = Observed(observed.xi, signals)
+    assert setup.task.stopped_objective(stopped, setup.task.is_bad(stopped)) == pytest.approx(10 * 2.0 - 2)
+
+
+def test_daisy_stops_where_its_unstopped_walk_first_leaves_the_walkway_or_falls():
+    setup = setups.load("daisy-11d-rehearsal")
+    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    physics = {name: (low + high) / 2 for name, (low, high) in setup.physics.intervals.items()}
+    with setup.open() as environment:
+        episode = rollout(setup, environment, x, physics)
+        free = rollout(replace(setup, stop=never), environment, x, physics)
+    tilt, corridor = (1 << setup.conditions.index(name) for name in ("tilt", "corridor"))
+    first = int(np.flatnonzero(free.bad & (tilt | corridor))[0])
+    assert episode.stop in (OFF_WALKWAY, TILTED)
+    assert np.array_equal(episode.xi[:, : first + 1], free.xi[:, : first + 1])
+    assert np.all(episode.xi[:, first:] == episode.xi[:, first : first + 1])
+    fast = np.count_nonzero(free.bad[: first + 1] & 1)
+    assert episode.f == pytest.approx(10 * free.xi[19, first] - fast, abs=1e-5)
+    assert episode.y == pytest.approx((np.count_nonzero(free.bad[:first]) + setup.horizon - first) / 1500)

@@ -95,7 +95,7 @@ class TabletopModel:
             camera=Camera(
                 target=(x, 0.0, 0.27),
                 follows="",
-                distance=1.85,
+                distance=1.75,
                 yaw=90.0 - math.copysign(32.0, y),
                 pitch=-33.0,
                 angle=38.0,

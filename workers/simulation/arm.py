@@ -106,9 +106,12 @@ class Arm:
             raise FileNotFoundError(f"no robot description at {path}")
         # Nobody looks: the meshes that are only seen would take 100 MB.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
-        return pybullet.loadURDF(
-            str(path), model.base, useFixedBase=True, flags=flags, physicsClientId=self._client
-        )
+        try:
+            return pybullet.loadURDF(
+                str(path), model.base, useFixedBase=True, flags=flags, physicsClientId=self._client
+            )
+        except pybullet.error as error:
+            raise ValueError(f"{path} must be a URDF that Bullet can load: {error}") from error
 
     def _joint_indices(self) -> dict[str, int]:
         count = pybullet.getNumJoints(self.body, physicsClientId=self._client)

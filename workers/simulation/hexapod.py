@@ -77,7 +77,12 @@ class Hexapod:
         with NamedTemporaryFile("w", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()
-            return pybullet.loadURDF(file.name, flags=flags, physicsClientId=self._client)
+            try:
+                return pybullet.loadURDF(file.name, flags=flags, physicsClientId=self._client)
+            except pybullet.error as error:
+                raise ValueError(
+                    f"the robot's description must be a URDF that Bullet can load, got {urdf[:60]!r}: {error}"
+                ) from error
 
     def _joint_names(self) -> list[str]:
         count = pybullet.getNumJoints(self.body, physicsClientId=self._client)

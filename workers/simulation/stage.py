@@ -128,8 +128,8 @@ class Stage:
         seen = np.array(colours, dtype=np.uint16).reshape(*shape, 4)[..., :3]
         row, column = np.nonzero(np.reshape(bodies, shape) < 0)
         seen[row, column] = _sky(shape[0])[row]
-        total = np.sum([seen[i::_FINER, j::_FINER] for i in range(_FINER) for j in range(_FINER)], axis=0)
-        return (total // _FINER**2).astype(np.uint8)
+        shares = [seen[i::_FINER, j::_FINER] for i in range(_FINER) for j in range(_FINER)]
+        return (np.stack(shares).sum(axis=0, dtype=np.uint16) // _FINER**2).astype(np.uint8)
 
 
 def _sun(yaw: float) -> tuple[float, float, float]:
