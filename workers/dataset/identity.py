@@ -11,6 +11,7 @@ from workers.rollout import VERSION as ROLLOUT_VERSION
 from workers.setups import Setup
 
 SCHEMA_VERSION = 1
+STORAGES = ("float32", "int16")
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Identity:
         pybullet: version.
         numpy: version.
         repeats: R, episodes of each controller, under different physics each.
+        storage: how ξ is stored: `float32`, or `int16` codes between the bounds of its channels.
     """
 
     setup: str
@@ -51,9 +53,12 @@ class Identity:
     pybullet: str
     numpy: str
     repeats: int = 1
+    storage: str = "float32"
 
     def __post_init__(self) -> None:
-        """Refuse shards without episodes, and controllers without them."""
+        """Refuse shards without episodes, controllers without them, and unknown storages."""
+        if self.storage not in STORAGES:
+            raise ValueError(f"storage must be one of {', '.join(STORAGES)}, got {self.storage!r}")
         for name in ("episodes_per_shard", "repeats"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -96,7 +101,9 @@ class Identity:
         )
 
 
-def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1) -> Identity:
+def identity_of(
+    setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1, storage: str = "float32"
+) -> Identity:
     """The identity of a dataset collected now, with this code and these libraries."""
     return Identity(
         setup=setup.name,
@@ -113,6 +120,7 @@ def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: in
         pybullet=version("pybullet"),
         numpy=version("numpy"),
         repeats=repeats,
+        storage=storage,
     )
 
 
