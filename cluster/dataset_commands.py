@@ -44,7 +44,7 @@ def info(folder: Folder) -> None:
         "episodes": f"{episodes} in {len(dataset.shards())} shards",
         "size": f"{kilobytes / 1e3:.1f} MB, {kilobytes / max(episodes, 1):.1f} kB an episode",
         "each": f"{identity.horizon} steps of {identity.control_step * 1e3:g} ms",
-        "observation": f"{len(identity.observation)} channels",
+        "observation": f"{len(identity.observation)} channels, stored as {identity.storage}",
         "controller": f"{len(identity.parameters)} parameters",
         "seed": str(identity.seed),
         "G_bad": _g_bad(identity),

@@ -111,7 +111,11 @@ def require_same_code(setup: Setup, dataset: Dataset) -> None:
     """
     asked = dataset.identity
     own = identity_of(
-        setup, seed=asked.seed, episodes_per_shard=asked.episodes_per_shard, repeats=asked.repeats
+        setup,
+        seed=asked.seed,
+        episodes_per_shard=asked.episodes_per_shard,
+        repeats=asked.repeats,
+        storage=asked.storage,
     )
     differences = asked.differences(own)
     if differences:
