@@ -66,13 +66,14 @@ def test_compression_spends_fewer_trials_on_controllers_predicted_bad():
     assert mean_badness("svae-dc") < mean_badness("random") - 0.1
 
 
-def test_search_off_the_pool_needs_neither_model_nor_pool():
+@pytest.mark.parametrize("name", ["botorch", "se-acqf"])
+def test_search_off_the_pool_needs_neither_model_nor_pool(name):
     bare = Problem(30, (0.0, 13.0), np.empty((0, 30), dtype=np.float32))
     history = History.empty(30)
     rng = np.random.default_rng(0)
     for x in rng.random((4, 30), dtype=np.float32):
         history = history.append(x, float(((x[:3] + 1) ** 2).sum()))
-    x = methods.build("botorch", bare).suggest(history, rng)
+    x = methods.build(name, bare).suggest(history, rng)
     assert x.shape == (30,)
     assert (x[:3] + 1).sum() > 5
 
