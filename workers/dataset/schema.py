@@ -18,6 +18,11 @@ from workers.rollout import Episode
 
 ROW_GROUP = 64  # episodes
 _SPLIT = ["x.list.element", "xi.list.element", "y", "f"]
+_BITS = "one bit per condition, the first condition lowest"
+_GRADED = "degree of badness of each step, in [0, 1]"
+
+Bad = UInt8[np.ndarray, "n time"] | Float32[np.ndarray, "n time"]
+"""Bits of the bad conditions per step, or degrees of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +30,13 @@ class Outcomes:
     """How episodes went, without their trajectories, in the order of the file.
 
     Attributes:
-        bad: bits of the bad conditions per step.
+        bad: bits of the bad conditions per step, or degrees of a graded G_bad.
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
     """
 
-    bad: UInt8[np.ndarray, "n time"]
+    bad: Bad
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
     stop: tuple[str, ...]
@@ -45,7 +50,7 @@ class Columns:
         episode: indices.
         x: controllers.
         xi: trajectories, channel-major.
-        bad: bits of the bad conditions per step.
+        bad: bits of the bad conditions per step, or degrees of a graded G_bad.
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
@@ -55,7 +60,7 @@ class Columns:
     episode: Int64[np.ndarray, " n"]
     x: Float32[np.ndarray, "n d"]
     xi: Float32[np.ndarray, "n obs time"]
-    bad: UInt8[np.ndarray, "n time"]
+    bad: Bad
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
     stop: tuple[str, ...]
@@ -73,20 +78,24 @@ def schema(identity: Identity) -> pa.Schema:
             {
                 "xi": ["observation", "time"],
                 "xi_shape": [len(identity.observation), identity.horizon],
-                "bad": "one bit per condition, the first condition lowest",
+                "bad": _GRADED if _is_graded(identity) else _BITS,
             }
         ),
     }
-    columns = {
+    columns: dict[str, pa.DataType] = {
         "episode": pa.int64(),
         "x": pa.list_(pa.field("element", pa.float32(), nullable=False), len(identity.parameters)),
         "xi": pa.list_(pa.field("element", pa.float32(), nullable=False), size),
-        "bad": pa.list_(pa.field("element", pa.uint8(), nullable=False), identity.horizon),
+        "bad": pa.list_(
+            pa.field("element", pa.float32() if _is_graded(identity) else pa.uint8(), nullable=False),
+            identity.horizon,
+        ),
         "y": pa.float32(),
         "f": pa.float32(),
         "stop": pa.dictionary(pa.int8(), pa.string()),
-        "physics": physics,
     }
+    if identity.physics:  # Parquet knows no structs without fields
+        columns["physics"] = physics
     return pa.schema(
         [pa.field(name, kind, nullable=False) for name, kind in columns.items()], metadata=metadata
     )
@@ -104,8 +113,9 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         "y": pa.array([episode.y for episode in episodes], type=kinds["y"]),
         "f": pa.array([episode.f for episode in episodes], type=kinds["f"]),
         "stop": pa.array([episode.stop for episode in episodes]).dictionary_encode().cast(kinds["stop"]),
-        "physics": pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"]),
     }
+    if "physics" in kinds:
+        arrays["physics"] = pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"])
     pq.write_table(
         pa.table(arrays, schema=layout),
         path,
@@ -113,9 +123,18 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         compression="zstd",
         compression_level=1,
         use_dictionary=["stop"],
-        use_byte_stream_split=_SPLIT,
+        use_byte_stream_split=[*_SPLIT, "bad.list.element"] if _is_graded(identity) else _SPLIT,
         write_page_checksum=True,
     )
+
+
+def degree(bad: Bad) -> Float32[np.ndarray, "n time"]:
+    """How bad each step is: the degree itself, or 1 where any bit is set."""
+    return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
+
+
+def _is_graded(identity: Identity) -> bool:
+    return identity.bad_kind == "graded"
 
 
 def _lists(arrays: Sequence[np.ndarray], kind: pa.DataType) -> pa.Array:
