@@ -41,7 +41,7 @@ def collect(
     Raises:
         UserError: the folder holds another dataset, the disk is full, or shards kept failing.
     """
-    identity = identity_of(setup, seed=seed, episodes_per_shard=settings.episodes_per_shard, repeats=repeats)
+    identity = _identity(setup, seed, repeats, settings)
     dataset, plan = planned(identity, episodes, folder)
     if not plan:
         say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
@@ -75,7 +75,7 @@ def foretell(
     Raises:
         UserError: as `collect` does, or too little is left to collect.
     """
-    identity = identity_of(setup, seed=seed, episodes_per_shard=settings.episodes_per_shard, repeats=repeats)
+    identity = _identity(setup, seed, repeats, settings)
     dataset, plan = planned(identity, episodes, folder)
     actors = min(settings.actor_count(session.cpus), len(plan))
     pilot = plan[: max(PILOT_SHARDS, 2 * actors)]
@@ -92,6 +92,16 @@ def foretell(
         run.metrics(tally.metrics() | metrics(expected), step=tally.episodes)
 
 
+def _identity(setup: Setup, seed: int, repeats: int, settings: CollectSettings) -> Identity:
+    return identity_of(
+        setup,
+        seed=seed,
+        episodes_per_shard=settings.episodes_per_shard,
+        repeats=repeats,
+        storage=settings.storage,
+    )
+
+
 def _parameters(
     identity: Identity, episodes: int, actors: int, settings: CollectSettings
 ) -> Mapping[str, Any]:
@@ -100,6 +110,7 @@ def _parameters(
         "episodes": episodes,
         "seed": identity.seed,
         "repeats": identity.repeats,
+        "bad": identity.bad_name,
         "actors": actors,
         "identity": identity.digest[:12],
         **settings.model_dump(mode="json"),

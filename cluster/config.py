@@ -58,6 +58,8 @@ class CollectSettings(Section):
     """Rollout processes, one CPU each; `all` is one per CPU of the cluster."""
     episodes_per_shard: PositiveInt = 256
     """Rows of one Parquet file; part of a dataset's identity."""
+    storage: Literal["float32", "int16"] = "float32"
+    """Of trajectories: exact, or codes between their channels' bounds; part of a dataset's identity."""
     shards_in_flight_per_actor: PositiveInt = 1
     """Shards handed to an actor ahead of its finishing the first."""
     attempts_per_shard: PositiveInt = 3

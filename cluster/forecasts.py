@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -89,7 +90,10 @@ def described(expected: Forecast, done: int) -> str:
 
 
 def _text(estimate: Estimate, factor: float) -> str:
-    return f"{estimate.value * factor:.2f} ± {estimate.margin * factor:.2f}"
+    """As many digits as the margin's first two."""
+    value, margin = estimate.value * factor, estimate.margin * factor
+    places = max(0, 1 - math.floor(math.log10(margin))) if margin else 2
+    return f"{value:.{places}f} ± {margin:.{places}f}"
 
 
 def _entry(tally: Tally, actors: int) -> dict[str, int | float]:

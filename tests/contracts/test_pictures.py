@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -91,14 +92,27 @@ def test_drawing_changes_no_byte_of_an_episode(setup, environment, episode):
     assert (pictures[0] != pictures[1]).any()
 
 
-def test_rollouts_load_nothing_that_is_only_seen(environment):
+def _shapes(client: int, body: int) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
+    """Link and mesh file ("" for none) of every shape of a body: what is touched, and what is seen."""
+    links = range(-1, pybullet.getNumJoints(body, physicsClientId=client))
+    touched = [(link, s[4]) for link in links for s in pybullet.getCollisionShapeData(body, link, client)]
+    seen = [(s[1], s[4]) for s in pybullet.getVisualShapeData(body, physicsClientId=client)]
+    return tuple(
+        sorted((link, name.decode() if Path(name.decode()).is_file() else "") for link, name in shapes)
+        for shapes in (touched, seen)
+    )
+
+
+def test_rollouts_load_nothing_that_is_only_seen(setup, environment):
     """Where a link has no visual shape, Bullet reports its collision shapes in their place."""
     client = environment._world.client
     for body in _bodies(client):
-        links = range(-1, pybullet.getNumJoints(body, physicsClientId=client))
-        touched = [s for link in links for s in pybullet.getCollisionShapeData(body, link, client)]
-        seen = pybullet.getVisualShapeData(body, physicsClientId=client)
-        assert sorted(shape[4] for shape in seen) == sorted(shape[4] for shape in touched)
+        touched, seen = _shapes(client, body)
+        assert seen == touched
+    with Stage() as stage:
+        body = Show(stage, environment.scenery, setup.observation).bodies[0][0]
+        touched, seen = _shapes(stage.client, body)
+        assert seen != touched
 
 
 def test_a_trajectory_of_another_setup_is_refused(setup):

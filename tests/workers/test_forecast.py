@@ -17,6 +17,7 @@ def reports(costs, episodes=16):
             shard=Shard(number * episodes, (number + 1) * episodes),
             badness=cost / 100,
             diverged=0,
+            stopped=0,
             best=0.0,
             size=int(1000 * cost),
             rollout_seconds=0.4 * cost,
