@@ -61,17 +61,19 @@ def on_paths(kernel: KernelOf, problem: Problem) -> Belief:
 
 def on_compressed_paths(kernel: KernelOf, problem: Problem) -> Belief:
     r"""k_0 on (1 - \bar y) \bar\tau, equation (k_svae_dc)."""
+    problem.known_badness()
     return _on_latents(svae_dc, kernel, problem)
 
 
 def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Belief:
     r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau."""
+    problem.known_badness()
     return _on_latents(Sigmoid(), kernel, problem)
 
 
 def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Belief:
     r"""k_0 on g(\bar y) \bar\tau / s, with one lengthscale: whitening has made the dimensions equal."""
-    latents = problem.known_latents()
+    latents = problem.known_badness()
     return _on_latents(Whitened.over(latents.tau, latents.y), lambda _: kernel(1), problem)
 
 
@@ -82,6 +84,7 @@ def on_screened_paths(kernel: KernelOf, problem: Problem) -> Belief:
 
 def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Belief:
     r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers."""
+    problem.known_badness()
     start, adjustable = Sigmoid(), problem.known_adjustable()
     trained = by_latents(problem, start)
 

@@ -60,6 +60,16 @@ class Problem:
         """The latents; without them, a `ValueError`."""
         return _known(self.latents, "latents", "Latents.of(pool, model.latent_means)")
 
+    def known_badness(self) -> Latents:
+        """The latents of a model that predicts badness; without them, or with an SVAE's, a `ValueError`."""
+        latents = self.known_latents()
+        if len(latents.y) and not latents.y.any():
+            raise ValueError(
+                "the model must predict badness, got an SVAE, which predicts 0 everywhere: "
+                "train an SVAE-DC, or use the method svae"
+            )
+        return latents
+
     def known_densities(self) -> Densities:
         """The distributions; without them, a `ValueError`."""
         return _known(self.densities, "densities", "Densities.of(model)")
@@ -70,7 +80,7 @@ class Problem:
 
     def least_bad(self, share: float) -> "Problem":
         """The same problem with only this share of the pool, the controllers predicted least bad."""
-        latents = self.known_latents()
+        latents = self.known_badness()
         kept = torch.argsort(latents.y, stable=True)[: math.ceil(share * len(self.pool))]
         screened = replace(latents, tau=latents.tau[kept], y=latents.y[kept])
         largest_y = float(screened.y.max()) if len(kept) else 0.0

@@ -175,3 +175,15 @@ def test_parts_of_a_problem_that_do_not_belong_together_are_refused():
         Problem(2, (0.0, 1.0), given.pool + 1)
     with pytest.raises(ValueError, match="pool's 4 controllers, got 5"):
         Problem(2, (0.0, 1.0), given.pool[:4], given.latents)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["svae-dc", "svae-dc-sigmoid", "svae-dc-online", "svae-dc-whitened", "screened-random", "screened-svae"],
+)
+def test_a_method_that_compresses_or_screens_refuses_a_model_that_knows_no_badness(name):
+    given = problem(2, 20, 0)
+    blind = replace(given, latents=replace(given.latents, y=torch.zeros_like(given.latents.y)))
+    with pytest.raises(ValueError, match=rf"method '{name}': the model must predict badness, got an SVAE"):
+        methods.build(name, blind)
+    assert methods.build("svae", blind)

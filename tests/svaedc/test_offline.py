@@ -31,7 +31,7 @@ def test_a_model_that_tells_is_worth_more_than_one_that_misleads():
 
 
 def test_random_search_over_everything_finds_the_mean_and_the_best():
-    found = worth("screened-random", RECORDED, lambda x: (x, torch.zeros(len(x))), runs=2, count=36)
+    found = worth("screened-random", RECORDED, lambda x: (x, torch.full((len(x),), 0.5)), runs=2, count=36)
     assert found.mean == pytest.approx(F.mean(), abs=0.15)
     assert worth("svae", Recorded(X[:8], F[:8], (-1.0, 1.0)), telling, runs=1, count=6).best == F[:8].max()
 
