@@ -24,9 +24,10 @@ from cluster.config import CollectSettings, RaySettings, TrackingSettings
 from cluster.session import connect
 from cluster.tracking import open_tracker
 from cluster.training_job import TrainingJob, episodes, trained
-from svaedc.episodes import Episodes, split
+from svaedc.episodes import Batch, Episodes, split
 from svaedc.model import initialised
 from svaedc.presets import Sizes, compact, paper
+from svaedc.stages import Objective
 from svaedc.training import fit
 from workers import setups
 
@@ -55,10 +56,16 @@ def in_cache(folder, stride):
     return split(Episodes(*mapped, np.arange(COUNT)), np.arange(COUNT))
 
 
-def preset_of(name, stride, updates, batch_size=None):
+def preset_of(name, stride, updates, batch_size=None, held_out_sample=512):
     model, training = {"compact": compact, "paper": paper}[name](Sizes(D, OBSERVATIONS, STEPS[stride]))
     training = replace(training.with_updates(joint=updates, prior=0), epoch_updates=updates)
+    training = replace(training, held_out_sample=held_out_sample)
     return model, replace(training, batch_size=batch_size or training.batch_size)
+
+
+def head(name, stride, updates, batch_size):
+    """For a few updates, measures on held-out episodes would count too much."""
+    return preset_of(name, stride, updates, batch_size, held_out_sample=2)
 
 
 def ours(halves, preset):
@@ -77,6 +84,7 @@ def plain(halves, preset):
         torch.from_numpy(np.asarray(array)[training.rows])
         for array in (training.x, training.xi, training.bad, training.y)
     ]
+    objective = Objective(model, settings.weighting)
     optimiser = torch.optim.AdamW(model.parameters(), settings.joint.learning_rate, weight_decay=0.0)
     elements = OBSERVATIONS * preset[0].time_steps
     begin = time.process_time()
@@ -84,8 +92,9 @@ def plain(halves, preset):
         for group in optimiser.param_groups:
             group["lr"] = settings.joint.learning_rate_at(update)
         rows = torch.randint(len(training), (settings.batch_size,))
-        log_p_xi, log_p_y, kl = model(*(column[rows] for column in columns))
-        loss = -(log_p_xi + log_p_y - kl).mean() / elements
+        terms = objective(Batch(*(column[rows] for column in columns)))
+        bound = terms["log_p_xi"] + terms["log_p_y"] - terms["kl"]
+        loss = -(bound + settings.weighting.from_x(terms)) / elements
         optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(model.parameters(), settings.joint.gradient_norm)
@@ -122,7 +131,7 @@ def under_ray(folder, session):
     tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db"))
     dataset = collect(
         setup=setups.load("franka"),
-        episodes=1024,
+        episodes=512,
         folder=folder / "dataset",
         seed=0,
         settings=CollectSettings(episodes_per_shard=128),
@@ -162,20 +171,20 @@ def main():
             (
                 "compact (stride 5, batches of 128) / paper (stride 1, 32)",
                 ">= 5",
-                lambda: ours(memory[5], small),
-                lambda: ours(memory[1], preset_of("paper", 1, 8)),
+                lambda: ours(memory[5], head("compact", 5, 40, 128)),
+                lambda: ours(memory[1], head("paper", 1, 8, 32)),
             ),
             (
                 "  the same at equal batches of 32",
                 "-",
-                lambda: ours(memory[5], preset_of("compact", 5, 60, 32)),
-                lambda: ours(memory[1], preset_of("paper", 1, 8)),
+                lambda: ours(memory[5], head("compact", 5, 60, 32)),
+                lambda: ours(memory[1], head("paper", 1, 8, 32)),
             ),
             (
                 "  the same at equal stride 5 and batches of 32",
                 "-",
-                lambda: ours(memory[5], preset_of("compact", 5, 60, 32)),
-                lambda: ours(memory[5], preset_of("paper", 5, 20)),
+                lambda: ours(memory[5], head("compact", 5, 60, 32)),
+                lambda: ours(memory[5], head("paper", 5, 20, 32)),
             ),
             (
                 "batches from the cache / from memory",

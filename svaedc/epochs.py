@@ -98,7 +98,7 @@ class Loop:
     def epochs(self, done: int) -> Iterator[EpochReport]:
         """Epochs of the stage that are left, each a fixed number of updates."""
         size, total = self._run.settings.epoch_updates, self._stage.settings.updates
-        if not done:
+        if not done and self._stage.keeps_best:
             self._stage.end_epoch(evaluate(self._run.model, self._measured_on))
         for epoch in range(done, -(-total // size)):
             updates = range(epoch * size, min((epoch + 1) * size, total))
@@ -108,6 +108,7 @@ class Loop:
             is_over = updates.stop == total or self._run.workplace.agree(self._stage.is_stale)
             if is_over:
                 self._stage.finish()
+            if is_over and self._stage.keeps_best:
                 held_out = evaluate(self._run.model, self._measured_on)
             metrics |= {f"held_out/{name}": value for name, value in held_out.items()}
             metrics["held_out/best_loss"] = best
