@@ -1,4 +1,4 @@
-"""How much of a Franka episode is physics: CPU time of its parts as ratios, in one run, medians over rounds.
+"""How much of an episode is physics: CPU time of its parts as ratios, in one run, medians over rounds.
 
 Ratios, because they hold on a busy machine; the load is printed beside them.
 """
@@ -20,6 +20,24 @@ from workers.environments.environment import Environment
 from workers.rollout import random_episode
 from workers.setups import Setup
 from workers.simulation.world import World
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a setup is meant to reach, as it is printed; "-" where nothing is asked for."""
+
+    loop: str = "-"
+    planning: str = "-"
+    reset: str = "-"
+    episode: str = "-"
+    size: str = "-"
+
+
+TARGETS = {
+    "franka": Target(loop="<= 1.40", planning="<= 6", reset="<= 1", episode="~ 80", size="<= 28"),
+    "yumi": Target(loop="<= 1.35"),
+    "daisy-27d": Target(loop="<= 1.12"),
+}
 
 
 @dataclass
@@ -99,34 +117,38 @@ def bytes_per_episode(setup: Setup, environment: Environment, episodes: int) -> 
         return path.stat().st_size / episodes
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--setup", default="franka")
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--episodes", type=int, default=10, help="of each round")
-    options = parser.parse_args()
-    setup = setups.load(options.setup)
-    cost = clock_cost()
+def report(name: str, count: int, episodes: int) -> None:
+    """Measure a setup in so many rounds of so many episodes, and print its ratios beside their targets."""
+    setup, cost, target = setups.load(name), clock_cost(), TARGETS.get(name, Target())
     with setup.open() as environment:
         random_episode(setup, environment, 0, 0)
         rounds = [
-            measure(setup, environment, range(n * options.episodes, (n + 1) * options.episodes), cost)
-            for n in range(options.rounds)
+            measure(setup, environment, range(n * episodes, (n + 1) * episodes), cost) for n in range(count)
         ]
         size = bytes_per_episode(setup, environment, 64)
     median = statistics.median
     rows = [
-        ("loop / its stepSimulation calls", median(r.loop / r.physics for r in rounds), "x", "<= 1.55"),
+        ("loop / its stepSimulation calls", median(r.loop / r.physics for r in rounds), "x", target.loop),
         ("episode / its stepSimulation calls", median(r.episodes / r.physics for r in rounds), "x", "-"),
-        ("planning / episode", 100 * median(r.planning / r.episodes for r in rounds), "%", "<= 6"),
-        ("reset / episode", 100 * median(r.reset / r.episodes for r in rounds), "%", "<= 1"),
-        ("CPU of one episode", 1e3 * median(r.episodes for r in rounds) / options.episodes, "ms", "~ 80"),
-        ("one trajectory on disk", size / 1e3, "kB", "<= 28"),
+        ("planning / episode", 100 * median(r.planning / r.episodes for r in rounds), "%", target.planning),
+        ("reset / episode", 100 * median(r.reset / r.episodes for r in rounds), "%", target.reset),
+        ("CPU of one episode", 1e3 * median(r.episodes for r in rounds) / episodes, "ms", target.episode),
+        ("one trajectory on disk", size / 1e3, "kB", target.size),
     ]
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
-    print(f"{setup.name}: {options.rounds} rounds x {options.episodes} episodes, {load}")
-    for name, value, unit, target in rows:
-        print(f"  {name:<36}{value:8.2f} {unit:<3} target {target}")
+    print(f"{setup.name}: {count} rounds x {episodes} episodes, {load}")
+    for what, value, unit, aim in rows:
+        print(f"  {what:<36}{value:8.2f} {unit:<3} target {aim}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--setup", nargs="+", default=list(TARGETS), help="all three robots by default")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--episodes", type=int, default=10, help="of each round")
+    options = parser.parse_args()
+    for name in options.setup:
+        report(name, options.rounds, options.episodes)
 
 
 if __name__ == "__main__":

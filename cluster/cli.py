@@ -24,6 +24,7 @@ from cluster.options import (
     settings_of,
     setup_of,
     usage_errors,
+    working,
 )
 from cluster.progress import say
 
@@ -39,7 +40,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
-    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`. "
+    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
+    "`render` shows an episode. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
@@ -85,21 +87,31 @@ def collect(
     repeats: Annotated[
         int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
     ] = 1,
+    bad: Annotated[
+        str,
+        typer.Option("--bad", metavar="MODULE:FUNCTION", help="G_bad of your own instead of the setup's."),
+    ] = "",
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
     address: Address = None,
+    *,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Collect a few shards, and say what all of it will cost.")
+    ] = False,
 ) -> None:
     """Roll out random controllers on a pool of Ray actors into Parquet shards.
 
     What the folder holds already is kept: run the same command again after an interruption, or ask for more
-    episodes to extend the dataset.
+    episodes to extend the dataset. With --plan, only the first shards are collected, and what all of them
+    will cost is told from those.
     """
     from cluster.collect import collect as run_collect
+    from cluster.collect import foretell
 
-    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
     with _services(settings, address) as (session, tracker):
-        run_collect(
+        (foretell if plan else run_collect)(
             setup=chosen,
             episodes=episodes,
             folder=dataset,
@@ -150,7 +162,9 @@ def compare(
     trials: Annotated[
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")
     ] = 20,
-    gap: Annotated[str, typer.Option("--gap", help="Hidden physics: paper, training or wide.")] = "paper",
+    gap: Annotated[
+        str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
+    ] = "paper",
     model: TrainedModel = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
@@ -200,7 +214,9 @@ def ui(
 def _add_groups() -> None:
     from cluster.dataset_commands import app as dataset_app
     from cluster.hardware.commands import app as hardware_app
+    from cluster.render_command import render
 
+    app.command()(render)
     app.add_typer(dataset_app, name="dataset")
     app.add_typer(hardware_app, name="hardware")
 

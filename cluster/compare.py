@@ -22,6 +22,7 @@ from svaedc import checkpoint
 from svaedc.comparison import Trial
 from svaedc.summaries import Summary
 from workers.dataset.shards import sha256
+from workers.physics import ranges
 from workers.rollout import VERSION
 from workers.setups import Setup
 
@@ -78,7 +79,8 @@ def compare(
     """Run what is missing of a comparison, then summarise all of it.
 
     Raises:
-        UsageError: a method or gap level does not exist, or a method lacks its model.
+        UsageError: a method or gap level does not exist, a gap's range is impossible, or a method lacks its
+            model.
         UserError: the folder holds another comparison or cannot be written, the model is of another setup,
             runs kept failing, or MLflow lacks some of the results.
     """
@@ -110,10 +112,11 @@ def _plan(
         setup.gap(gap)
     grid.require(model)
     path = _checkpoint(model, setup) if grid.with_model() and model else None
+    level = str(ranges(gap)) if "=" in gap else gap  # so that equal ranges are one comparison
     job = ComparisonJob(
         folder=folder.resolve(),
         setup=setup.name,
-        gap=gap,
+        gap=level,
         model=str(path.resolve()) if path else "",
         pool_size=settings.pool_size,
         initial=settings.initial_trials,
@@ -121,7 +124,7 @@ def _plan(
     )
     identity = {
         "setup": setup.name,
-        "gap": gap,
+        "gap": level,
         "pool_size": settings.pool_size,
         "initial_trials": settings.initial_trials,
         "rollout_version": VERSION,

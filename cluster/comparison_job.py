@@ -36,7 +36,7 @@ class ComparisonJob:
     Attributes:
         folder: of the results.
         setup: its name.
-        gap: level of the hidden physics.
+        gap: level of the hidden physics, or its ranges written out.
         model: checkpoint; "" when no method needs one.
         pool_size: candidates of each run.
         initial: random trials that all methods of a seed share.

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+)
 
 from cluster.errors import UsageError, nearest
 
@@ -36,6 +45,8 @@ class RaySettings(Section):
     """Bytes of shared memory for objects; results here are small, so little is needed."""
     temporary_folder: UserPath = Path("/tmp/ray")
     """Sockets and logs; short, because a socket's whole path may have 107 characters."""
+    log_file_bytes: int = Field(default=20_000_000, ge=100_000)
+    """Bytes after which a process of Ray begins its log anew; the full one before it is kept."""
     connect_timeout_seconds: PositiveFloat = 5.0
     """How long a running cluster has to accept a connection."""
 
@@ -47,6 +58,8 @@ class CollectSettings(Section):
     """Rollout processes, one CPU each; `all` is one per CPU of the cluster."""
     episodes_per_shard: PositiveInt = 256
     """Rows of one Parquet file; part of a dataset's identity."""
+    storage: Literal["float32", "int16"] = "float32"
+    """Of trajectories: exact, or codes between their channels' bounds; part of a dataset's identity."""
     shards_in_flight_per_actor: PositiveInt = 1
     """Shards handed to an actor ahead of its finishing the first."""
     attempts_per_shard: PositiveInt = 3
@@ -59,11 +72,20 @@ class CollectSettings(Section):
         return max(1, cpus) if self.actors == "all" else self.actors
 
 
+CHANGEABLE = (
+    *("model", "latent", "distribution", "head"),
+    *("weighting", "kl_weight", "learning_rate", "patience"),
+)
+"""Settings of training that belong to the preset unless they are given."""
+
+
 class TrainSettings(Section):
     """`svaedc train`: where and for how long; what is trained is the preset's business."""
 
     workers: PositiveInt = 1
     """Data-parallel training processes."""
+    least_workers: PositiveInt | Literal["all"] = "all"
+    """With fewer than `workers`, training starts and goes on with as many as there is room for."""
     threads: PositiveInt | Literal["all"] = "all"
     """Of each process, one CPU each; `all` shares the free CPUs among the processes, each on one machine."""
     updates: PositiveInt | Literal["preset"] = "preset"
@@ -76,6 +98,32 @@ class TrainSettings(Section):
     """Where shards are decoded into one memory-mapped array, once per dataset."""
     checkpoint_every_epochs: PositiveInt = 1
     """Epochs that an interruption may cost."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """`auto` takes a GPU for each process where the cluster has any; `cuda` refuses to do without."""
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """Of matrix products; `auto` is bfloat16 on a GPU that has it, and float32 elsewhere."""
+    balance: Literal["none", "y", "f"] = "none"
+    """Show episodes of every tenth of the range of y or f equally often; for skewed data."""
+    model: Literal["preset", "svae-dc", "svae"] = "preset"
+    """`svae` knows nothing of badness."""
+    latent: Literal["preset", "3x3", "5x6", "15x12"] = "preset"
+    """Steps of the latent path x dimensions of each, with the hidden sizes the paper gives them."""
+    distribution: Literal["preset", "laplace", "gaussian"] = "preset"
+    """Family of all four distributions."""
+    head: Literal["preset", "low-rank", "dense"] = "preset"
+    """Output of p(xi|tau)."""
+    weighting: Literal["preset", "paper", "balanced"] = "preset"
+    """Weights of the bound's terms: the paper's equation, or one that keeps psi alive."""
+    kl_weight: NonNegativeFloat | Literal["preset"] = "preset"
+    """Of the KL term; 1 is the paper's equation."""
+    learning_rate: PositiveFloat | Literal["preset"] = "preset"
+    """Of the first update of the joint stage."""
+    patience: PositiveInt | Literal["preset"] = "preset"
+    """Epochs (250 updates) without a better held-out loss after which a stage ends early."""
+
+    def changes(self) -> dict[str, str | float | int]:
+        """What is changed of the preset, by name."""
+        return {name: getattr(self, name) for name in CHANGEABLE if getattr(self, name) != "preset"}
 
 
 class CompareSettings(Section):

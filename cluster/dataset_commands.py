@@ -7,15 +7,20 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from cluster.dataset_export import export
+from cluster.dataset_repair import recomputed, repair_dataset
 from cluster.errors import UserError
+from cluster.options import durable, interruptible
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.identity import Identity
+from workers.dataset.inventory import inventory
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
-from workers.dataset.verification import gaps, verify
+from workers.dataset.verification import Problem, gaps, overlaps, verify
 
-app = typer.Typer(no_args_is_help=True, help="Look into a dataset, or prove that it is whole.")
+app = typer.Typer(no_args_is_help=True, help="Look into a dataset, prove that it is whole, or repair it.")
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the dataset.")]
 
@@ -39,9 +44,10 @@ def info(folder: Folder) -> None:
         "episodes": f"{episodes} in {len(dataset.shards())} shards",
         "size": f"{kilobytes / 1e3:.1f} MB, {kilobytes / max(episodes, 1):.1f} kB an episode",
         "each": f"{identity.horizon} steps of {identity.control_step * 1e3:g} ms",
-        "observation": f"{len(identity.observation)} channels",
+        "observation": f"{len(identity.observation)} channels, stored as {identity.storage}",
         "controller": f"{len(identity.parameters)} parameters",
         "seed": str(identity.seed),
+        "G_bad": _g_bad(identity),
         "repeats": f"{identity.repeats} of each controller",
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
@@ -67,7 +73,13 @@ def _described(found: Statistics) -> dict[str, str]:
         "badness": f"{found.badness:.3f} on average",
         "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
         "diverged": str(found.diverged),
+        "stopped": ", ".join(f"{count} {reason}" for reason, count in found.stopped.items()) or "0",
     }
+
+
+def _g_bad(identity: Identity) -> str:
+    name = f"{identity.bad_name} ({identity.bad_digest[:12]})" if identity.bad_name else "the setup's own"
+    return f"{name}, {identity.bad_kind}"
 
 
 def _irreducible(dataset: Dataset) -> dict[str, str]:
@@ -83,14 +95,18 @@ def _irreducible(dataset: Dataset) -> dict[str, str]:
 
 
 @app.command(name="verify")
-def verify_command(folder: Folder) -> None:
+def verify_command(
+    folder: Folder,
+    rederive: Annotated[
+        int, typer.Option("--rederive", metavar="K", min=0, help="Roll out K random shards again as well.")
+    ] = 0,
+) -> None:
     """Check every byte and row; exits with 1, names each broken file and each gap. Changes nothing."""
     dataset = _opened(folder)
-    found = []
-    with ProgressLine("episodes", dataset.episodes(), 0) as progress:
-        for shard, problems in verify(dataset):
-            found += problems
-            progress.advance(shard.episodes, f"{len(found)} problems")
+    found = [*inventory(dataset), *_problems_in_files(dataset)]
+    if rederive:
+        with interruptible():
+            found += recomputed(dataset, rederive)
     uncollected = list(gaps(dataset))
     for problem in found:
         typer.echo(f"{problem.file}: {problem.what}")
@@ -98,8 +114,8 @@ def verify_command(folder: Folder) -> None:
         typer.echo(f"episodes {gap.start} to {gap.stop - 1} are not collected yet")
     if found:
         raise UserError(
-            f"{len(found)} problems in {folder}; delete the files named above and their .sha256, and run "
-            "`svaedc collect` again: it recomputes exactly those episodes"
+            f"{len(found)} problems in {folder}; `svaedc dataset repair {folder}` recomputes what is broken "
+            "or missing and keeps what it replaces"
         )
     if uncollected:
         raise UserError(
@@ -107,3 +123,41 @@ def verify_command(folder: Folder) -> None:
             "run `svaedc collect` again: it collects exactly those"
         )
     typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")
+
+
+def _problems_in_files(dataset: Dataset) -> list[Problem]:
+    found: list[Problem] = []
+    with ProgressLine("episodes", dataset.episodes(), 0) as progress:
+        for shard, problems in verify(dataset):
+            found += problems
+            progress.advance(shard.episodes, f"{len(found)} problems")
+    return found
+
+
+@app.command(name="repair")
+def repair_command(folder: Folder) -> None:
+    """Roll out broken and lost shards again and put them in place; keeps what it replaces."""
+    dataset = _opened(folder)
+    with interruptible():
+        repair_dataset(dataset)
+    left = [*inventory(dataset), *overlaps(dataset)]
+    for problem in left:
+        typer.echo(f"{problem.file}: {problem.what}")
+    if left:
+        raise UserError(
+            f"{len(left)} problems in {folder} are none of broken files; look at the files named above and "
+            "remove what does not belong there"
+        )
+
+
+@app.command(name="export")
+def export_command(
+    folder: Folder,
+    form: Annotated[str, typer.Option("--format", help="npz (NumPy archives) or lerobot (v3.0).")],
+    out: Annotated[Path, typer.Option("--out", help="A new folder.", callback=durable)],
+) -> None:
+    """Write the episodes in another format, one shard in memory at a time."""
+    dataset = _opened(folder)
+    with interruptible():
+        export(dataset, form, out)
+    typer.echo(f"{out} holds {dataset.episodes()} episodes")

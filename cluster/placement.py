@@ -33,11 +33,20 @@ class Placement:
         processes: how many.
         cpus: of each, on one machine.
         gpus: of each, on the same machine; 0 or 1.
+        least: processes to go on with when there is no longer room for all; 0 for all.
     """
 
     processes: int
     cpus: int
     gpus: int
+    least: int = 0
+
+    def __str__(self) -> str:
+        """For the person who watches."""
+        many = f"{self.processes} processes" if self.processes > 1 else "1 process"
+        fewer = f" (or as few as {self.least})" if self.least else ""
+        cpus = f"{self.cpus} CPUs" if self.cpus > 1 else "1 CPU"
+        return f"{many}{fewer} of {cpus}{' and a GPU' if self.gpus else ''}"
 
     def fits(self, machines: Sequence[Machine]) -> bool:
         """Whether there is room for all of them."""
@@ -48,18 +57,30 @@ class Placement:
         return min(by_cpus, machine.gpus // self.gpus) if self.gpus else by_cpus
 
 
-def place(processes: int, cpus: int | Literal["all"], machines: Sequence[Machine]) -> Placement:
-    """Decide the size of processes; each takes a GPU where the cluster has any.
+def place(
+    processes: int,
+    cpus: int | Literal["all"],
+    machines: Sequence[Machine],
+    device: Literal["auto", "cpu", "cuda"] = "auto",
+) -> Placement:
+    """Decide the size of processes.
 
     Args:
         processes: how many shall run at the same time.
         cpus: of each; `all` for as many as there is room for.
         machines: what is free.
+        device: `auto` gives each process a GPU where the cluster has any.
 
     Raises:
-        UserError: there is no room, with what is free and the remedy.
+        UserError: there is no room, or no GPU, with what is free and the remedy.
     """
-    gpus = 1 if any(machine.gpus for machine in machines) else 0
+    has_gpus = any(machine.gpus for machine in machines)
+    if device == "cuda" and not has_gpus:
+        raise UserError(
+            "train.device=cuda asks for a GPU and Ray finds none free: wait for one, add a machine that "
+            "has one and a CUDA build of PyTorch, or use --set train.device=auto"
+        )
+    gpus = 1 if has_gpus and device != "cpu" else 0
     least = 1 if cpus == "all" else cpus
     if not Placement(processes, least, gpus).fits(machines):
         raise UserError(_no_room(Placement(processes, least, gpus), machines))

@@ -1,23 +1,23 @@
 """The rollout process, in a module of its own so that it loads nothing that only the driver needs."""
 
-import socket
 from pathlib import Path
 
 from workers import setups
-from workers.collection import ShardReport, collect_shard
+from workers.collection import ShardReport, collect_shard, require_same_code, require_working
 from workers.dataset.folder import open_dataset
-from workers.dataset.identity import identity_of
 from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
+from workers.tasks.own_bad import with_bad
 
 
 class RolloutActor:
     """A process that rolls out shards of one dataset."""
 
     def __init__(self, setup: str, folder: str) -> None:
-        self._setup = setups.load(setup)
         self._dataset = open_dataset(Path(folder))
-        self._require_same_code()
+        self._setup = with_bad(setups.load(setup), self._dataset.identity.bad_name)
+        require_same_code(self._setup, self._dataset)
+        require_working(self._setup, self._dataset.identity.seed)
 
     def ready(self) -> str:
         """The name under which this process writes files, once it has started and found its dataset."""
@@ -26,20 +26,3 @@ class RolloutActor:
     def collect(self, shard: Shard) -> ShardReport:
         """One shard, from its first episode to its name in the dataset."""
         return collect_shard(self._setup, self._dataset, shard)
-
-    def _require_same_code(self) -> None:
-        """Refuse to work on a machine whose rollouts would differ from those that the dataset promises."""
-        asked = self._dataset.identity
-        own = identity_of(
-            self._setup,
-            seed=asked.seed,
-            episodes_per_shard=asked.episodes_per_shard,
-            repeats=asked.repeats,
-        )
-        differences = asked.differences(own)
-        if differences:
-            raise ValueError(
-                f"the machine {socket.gethostname()} would roll out other episodes than "
-                f"{self._dataset.folder} holds; the two differ in {'; '.join(differences)}. "
-                "Install the same svaedc and libraries on every machine"
-            )

@@ -95,6 +95,7 @@ def _session(*, is_local: bool) -> Session:
 def _start(settings: RaySettings) -> None:
     """Starts a cluster. Its dashboard runs too, because Ray Train queries it all the time."""
     _stay_on_loopback()
+    _bound_logs(settings.log_file_bytes)
     try:
         ray.init(
             address="local",
@@ -183,6 +184,12 @@ def _use_token() -> None:
     if "RAY_AUTH_MODE" not in os.environ and loader.has_token(ignore_auth_mode=True):
         os.environ["RAY_AUTH_MODE"] = "token"
         Config.initialize("")
+
+
+def _bound_logs(size: int) -> None:
+    """Two files of that many bytes per stream of a process; otherwise Ray lets a worker's output grow."""
+    os.environ["RAY_ROTATION_MAX_BYTES"] = str(size)
+    os.environ["RAY_ROTATION_BACKUP_COUNT"] = "1"
 
 
 def _stay_on_loopback() -> None:

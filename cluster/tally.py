@@ -1,11 +1,13 @@
 """What a collection has done so far, and its record in MLflow while it goes on."""
 
+import math
 import time
 from collections import defaultdict
 from dataclasses import dataclass, field
 
 from cluster.errors import UserError
 from cluster.progress import say
+from cluster.rates import Rates
 from cluster.tracking import Run
 from workers.collection import ShardReport
 from workers.dataset.shards import Shard
@@ -20,12 +22,15 @@ class Tally:
     episodes: int = 0
     size: int = 0
     diverged: int = 0
+    stopped: int = 0
     bad: float = 0.0  # summed over episodes
     best: float = float("-inf")
     rollout_seconds: float = 0.0
     storage_seconds: float = 0.0
     retries: int = 0
     errors: dict[Shard, list[str]] = field(default_factory=lambda: defaultdict(list))
+    planned: int = 0  # episodes of the plan
+    rates: Rates = field(default_factory=Rates)
     begin: float = field(default_factory=time.monotonic)
 
     def add(self, report: ShardReport) -> None:
@@ -33,24 +38,43 @@ class Tally:
         self.episodes += report.shard.episodes
         self.size += report.size
         self.diverged += report.diverged
+        self.stopped += report.stopped
         self.bad += report.badness * report.shard.episodes
         self.best = max(self.best, report.best)
         self.rollout_seconds += report.rollout_seconds
         self.storage_seconds += report.storage_seconds
+        self.rates.add(report.machine, report.shard.episodes)
+
+    @property
+    def seconds(self) -> float:
+        """Wall time since the work began."""
+        return time.monotonic() - self.begin
+
+    @property
+    def core_seconds(self) -> float:
+        """CPU time of the rollout processes in rollouts and storage."""
+        return self.rollout_seconds + self.storage_seconds
+
+    def note(self) -> str:
+        """What a person wants to know beside counts and rate."""
+        return f"bad {self.bad / max(self.episodes, 1):.2f}{self.rates.note()}"
 
     def metrics(self) -> dict[str, float]:
         """The tally as numbers for MLflow, by name."""
-        seconds = time.monotonic() - self.begin
+        rate = self.episodes / max(self.seconds, 1e-9)
         values = {
             "episodes": self.episodes,
-            "episodes_per_second": self.episodes / max(seconds, 1e-9),
+            "episodes_per_second": rate,
+            "seconds_left": (self.planned - self.episodes) / rate if rate and self.planned else math.nan,
             "badness": self.bad / max(self.episodes, 1),
             "best_objective": self.best,
             "diverged": self.diverged,
+            "stopped": self.stopped,
             "bytes_per_episode": self.size / max(self.episodes, 1),
-            "core_hours": (self.rollout_seconds + self.storage_seconds) / 3600,
-            "storage_share": self.storage_seconds / max(self.rollout_seconds + self.storage_seconds, 1e-9),
+            "core_hours": self.core_seconds / 3600,
+            "storage_share": self.storage_seconds / max(self.core_seconds, 1e-9),
             "retries": self.retries,
+            **{f"machine/{name}/episodes_per_second": rate for name, rate in self.rates.now().items()},
         }
         return {name: float(value) for name, value in values.items()}
 

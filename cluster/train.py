@@ -7,13 +7,13 @@ from pathlib import Path
 
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
-from cluster.placement import free_machines, place
+from cluster.placement import free_machines
 from cluster.progress import ProgressLine, say
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
 from cluster.training_job import MODEL, STATE, TrainingJob, done, saved_state
 from cluster.training_record import judge, read_json, record, recorded, write_json
-from cluster.training_submission import submit
+from cluster.training_submission import placed, submit
 from svaedc import checkpoint
 from svaedc.training import require_settings
 from workers.dataset.cache import TrainingCache
@@ -123,6 +123,8 @@ def _job(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainS
             "preset": preset,
             "stride": settings.stride,
             "seed": seed,
+            "balance": settings.balance,
+            "changes": settings.changes(),
         },
         preset=preset,
         updates=0 if settings.updates == "preset" else settings.updates,
@@ -130,6 +132,9 @@ def _job(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainS
         seed=seed,
         time_limit=settings.time_limit_seconds,
         checkpoint_every=settings.checkpoint_every_epochs,
+        changes=settings.changes(),
+        balance=settings.balance,
+        precision=settings.precision,
     )
 
 
@@ -180,6 +185,7 @@ def _run(plan: _Plan, tracker: Tracker, settings: TrainSettings) -> Iterator[Run
 
 
 def _submit(plan: _Plan, settings: TrainSettings, session: Session, run: Run) -> None:
-    placement = place(settings.workers, settings.threads, free_machines(session))
+    placement = placed(settings, free_machines(session))
+    say(f"training with {placement}")
     with ProgressLine("updates", plan.updates, plan.done) as progress:
         submit(plan.job, placement, progress, run)

@@ -1,7 +1,7 @@
 """What one training process does: load, resume, run the core's loop, keep its state on disk, send word."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,11 @@ from svaedc import checkpoint
 from svaedc.episodes import Episodes, split
 from svaedc.model import SvaeDc, initialised
 from svaedc.presets import Preset, Sizes, preset
-from svaedc.sampling import Shard
+from svaedc.sampling import Balanced, Order, Shard, uniform
 from svaedc.settings import TrainingSettings
 from svaedc.training import EpochReport, fit
+from svaedc.variants import varied
+from svaedc.workplace import Workplace
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
 
@@ -41,6 +43,9 @@ class TrainingJob:
         seed: of weights, order and draws.
         time_limit: seconds after which training stops at the end of an epoch.
         checkpoint_every: epochs between two checkpoints.
+        changes: of the preset, by name.
+        balance: quantity whose strata are shown equally often: `y`, `f` or `none`.
+        precision: `auto`, `float32` or `bfloat16`.
     """
 
     dataset: Path
@@ -53,6 +58,9 @@ class TrainingJob:
     seed: int
     time_limit: float
     checkpoint_every: int
+    changes: dict[str, Any] = field(default_factory=dict)
+    balance: str = "none"
+    precision: str = "float32"
 
     def __post_init__(self) -> None:
         """Refuse paths that mean something else in another process."""
@@ -80,11 +88,19 @@ class TrainingJob:
 
     def settings(self, cache: TrainingCache) -> Preset:
         """The preset for this data, with the job's seed and budget."""
-        made = preset(self.preset)(Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2]))
+        sizes = Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2])
+        made = varied(preset(self.preset)(sizes), self.changes)
         training = replace(made.training, seed=self.seed)
         if self.updates:
             training = training.with_updates(self.updates, self.updates if training.prior.updates else 0)
         return Preset(made.model, training)
+
+    def order(self, cache: TrainingCache) -> Order:
+        """How the training episodes follow each other."""
+        if self.balance == "none":
+            return uniform
+        quantity = {"y": cache.y, "f": cache.f}[self.balance]
+        return Balanced(np.asarray(quantity[cache.training()]))
 
 
 def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
@@ -111,26 +127,31 @@ def run_worker(config: dict[str, Any]) -> None:
 
 def trained(job: TrainingJob, mailbox: Any) -> SvaeDc:
     """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
-    context = ray.train.get_context()
-    shard = Shard(context.get_world_rank(), context.get_world_size())
     begin = time.monotonic()
+    device = get_device()
+    workplace = _workplace(job, device)
+    rank = workplace.shard.rank
     cache = job.data()
     training, held_out = episodes(cache)
     settings = job.settings(cache)
-    model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(get_device())
+    model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(device)
     state = saved_state(job)
     update = 0 if state is None else done(state, settings.training)
-    for report in fit(model, training, held_out, settings.training, state, shard, prepare_model):
-        late = broadcast_from_rank_zero(time.monotonic() - begin > job.time_limit)
-        update = report.update
-        if shard.rank == 0:
+    if rank == 0:
+        mailbox.put.remote({"device": f"{_named(device)}, {workplace.precision}"})
+    mark, size = time.monotonic(), settings.training.batch_size
+    for report in fit(model, training, held_out, settings.training, state, job.order(cache), workplace):
+        late = workplace.agree(time.monotonic() - begin > job.time_limit)
+        if rank == 0:
             if late or report.is_last or report.epoch % job.checkpoint_every == 0:
                 checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
-            mailbox.put.remote(_message(report))
+            rate = (report.update - update) * size / (time.monotonic() - mark)
+            mailbox.put.remote(_message(report, rate))
+        update, mark = report.update, time.monotonic()
         ray.train.report({"update": update})
         if late:
             break
-    if shard.rank == 0:
+    if rank == 0:
         metadata = {**job.origin, "update": update, "versions": _versions()}
         checkpoint.save(job.model / MODEL, model, metadata)
     return model
@@ -140,7 +161,8 @@ def done(state: dict[str, Any], settings: TrainingSettings) -> int:
     """Updates behind a saved state, over both stages."""
     before = settings.joint.updates if state["stage"] == "prior" else 0
     stage = settings.prior if state["stage"] == "prior" else settings.joint
-    return before + min(state["epoch"] * settings.epoch_updates, stage.updates)
+    is_over = state["is_over"]
+    return before + (stage.updates if is_over else state["epoch"] * settings.epoch_updates)
 
 
 def saved_state(job: TrainingJob) -> dict[str, Any] | None:
@@ -157,9 +179,31 @@ def saved_state(job: TrainingJob) -> dict[str, Any] | None:
     return content["state"]
 
 
-def _message(report: EpochReport) -> dict[str, Any]:
-    names = ("stage", "update", "updates", "metrics")
-    return {name: getattr(report, name) for name in names}
+def _workplace(job: TrainingJob, device: torch.device) -> Workplace:
+    """This process among those of Ray Train."""
+    context = ray.train.get_context()
+    precision = job.precision
+    if precision == "auto":
+        has_bfloat16 = device.type == "cuda" and torch.cuda.is_bf16_supported(including_emulation=False)
+        precision = "bfloat16" if has_bfloat16 else "float32"
+    return Workplace(
+        Shard(context.get_world_rank(), context.get_world_size()),
+        prepare_model,
+        broadcast_from_rank_zero,
+        precision,
+    )
+
+
+def _named(device: torch.device) -> str:
+    if device.type == "cuda":
+        return f"{device} ({torch.cuda.get_device_name(device)})"
+    return f"{device} ({torch.get_num_threads()} threads)"
+
+
+def _message(report: EpochReport, rate: float) -> dict[str, Any]:
+    names = ("stage", "update", "updates")
+    metrics = {**report.metrics, "train/trajectories_per_second": rate}
+    return {**{name: getattr(report, name) for name in names}, "metrics": metrics}
 
 
 def _versions() -> dict[str, str]:

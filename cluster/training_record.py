@@ -7,13 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import torch
-
-from cluster import figures
+from cluster import figures, latent_figures
 from cluster.errors import UserError
 from cluster.files import replacing
 from cluster.progress import say
-from cluster.tracking import Run
+from cluster.tracking import Run, log_model
 from cluster.training_job import MODEL, TrainingJob, episodes
 from svaedc import checkpoint, diagnostics
 from workers.dataset.cache import TrainingCache
@@ -38,13 +36,21 @@ def record(job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run) -
     _, held_out = episodes(cache)
     metrics = diagnostics.evaluate(model, held_out)
     collapsed = diagnostics.collapse(metrics) or ""
-    figure = figures.reconstruction(job.model / "reconstruction.png", model, held_out, dataset.identity)
+    pictures = [
+        figures.reconstruction(job.model / "reconstruction.png", model, held_out, dataset.identity),
+        latent_figures.latent_space(job.model / "latent-space.png", model, held_out, cache.f[held_out.rows]),
+    ]
+    if model.config.has_psi:
+        pictures.append(latent_figures.badness(job.model / "badness.png", model, held_out))
     summary = {"metrics": metrics, "collapsed": collapsed, "episodes": len(cache.episode), **metadata}
     run.metrics({f"final/{name}": value for name, value in metrics.items()}, step=metadata["update"])
-    run.figure(figure)
+    for picture in pictures:
+        run.figure(picture)
     run.file(job.model / MODEL)
+    sizes = model.config.controller_dim, model.config.tau_size
+    log_model(run, job.model / MODEL, *sizes, step=metadata["update"])
     run.dict("model", summary)
-    run.tags({"svaedc.collapsed": collapsed or "no", "svaedc.device": _device()})
+    run.tags({"svaedc.collapsed": collapsed or "no"})
     write_json(job.model / MEASURES, summary)
     say(
         f"{job.model / MODEL}: held-out error against the per-step median {metrics['rec_norm']:.2f} "
@@ -96,7 +102,3 @@ def read_json(path: Path) -> dict[str, Any]:
     except (FileNotFoundError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def _device() -> str:
-    return "cuda" if torch.cuda.is_available() else "cpu"

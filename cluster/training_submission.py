@@ -5,8 +5,9 @@ import shutil
 import signal
 import threading
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
 from typing import Any
 
@@ -14,9 +15,10 @@ from ray.train import ControllerError, RunConfig, ScalingConfig, TrainingFailedE
 from ray.train.torch import TorchTrainer
 from ray.train.v2.api.config import FailureConfig
 
-from cluster.errors import UserError
+from cluster.config import TrainSettings
+from cluster.errors import UsageError, UserError
 from cluster.mailbox import mailbox
-from cluster.placement import Placement
+from cluster.placement import Machine, Placement, place
 from cluster.progress import ProgressLine, say
 from cluster.tracking import Run
 from cluster.training_job import TrainingJob, run_worker
@@ -27,6 +29,23 @@ _STARTS = 2
 """Starts of the processes that Ray Train tries anew; each waits a minute for its room."""
 _WILL_RECUR = (ValueError, OSError, ArithmeticError, LookupError)
 """What the core and the disk raise: another try would end the same way."""
+
+
+def placed(settings: TrainSettings, machines: Sequence[Machine]) -> Placement:
+    """How many processes of which size train; fewer than asked for where that is allowed and room is scarce.
+
+    Raises:
+        UserError: there is no room, or no GPU, with what is free and the remedy.
+    """
+    if settings.least_workers == "all":
+        return place(settings.workers, settings.threads, machines, settings.device)
+    if settings.least_workers > settings.workers:
+        raise UsageError(
+            f"train.least_workers must be at most train.workers, got {settings.least_workers} of "
+            f"{settings.workers}; lower one with --set, or raise the other"
+        )
+    least = place(settings.least_workers, settings.threads, machines, settings.device)
+    return replace(least, processes=settings.workers, least=settings.least_workers)
 
 
 def submit(job: TrainingJob, placement: Placement, progress: ProgressLine, run: Run) -> None:
@@ -56,19 +75,31 @@ class _Reports:
 
     def receive(self, report: dict[str, Any]) -> None:
         """Show and record one report; a store that fails is told once and ends nothing."""
+        if "device" in report:
+            say(f"training on {report['device']}")
+        else:
+            self._show(report)
+        try:
+            self._record(report)
+        except UserError as error:
+            if not self._complained:
+                say(f"{error}. Training goes on; its curves will have gaps")
+            self._complained = True
+            raise
+
+    def _show(self, report: dict[str, Any]) -> None:
         metrics = report["metrics"]
         self._progress.advance(
             report["update"] - self._progress.done,
             f"{report['stage']}, error against the median: reconstructed {metrics['held_out/rec_norm']:.2f}, "
             f"generated {metrics['held_out/gen_norm']:.2f}",
         )
-        try:
-            self._run.metrics(metrics, step=report["update"])
-        except UserError as error:
-            if not self._complained:
-                say(f"{error}. Training goes on; its curves will have gaps")
-            self._complained = True
-            raise
+
+    def _record(self, report: dict[str, Any]) -> None:
+        if "device" in report:
+            self._run.tags({"svaedc.device": report["device"]})
+        else:
+            self._run.metrics(report["metrics"], step=report["update"])
 
 
 def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
@@ -77,7 +108,7 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
         run_worker,
         train_loop_config={"job": job, "threads": placement.cpus, "mailbox": box},
         scaling_config=ScalingConfig(
-            num_workers=placement.processes,
+            num_workers=_workers(placement),
             use_gpu=placement.gpus > 0,
             resources_per_worker={"CPU": placement.cpus},
         ),
@@ -92,6 +123,11 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
             trainer.fit()
     finally:
         shutil.rmtree(storage, ignore_errors=True)
+
+
+def _workers(placement: Placement) -> Any:
+    """A pair of numbers makes Ray Train elastic, which its base class does not know."""
+    return (placement.least, placement.processes) if placement.least else placement.processes
 
 
 @contextmanager

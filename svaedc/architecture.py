@@ -23,7 +23,6 @@ _SIZES: Final = (
     "time_steps",
     "path_length",
     "tau_dim",
-    "psi_dim",
     "rank",
 )
 
@@ -51,7 +50,8 @@ class ModelConfig:
         time_steps: Steps S of a (strided) trajectory.
         path_length: K, steps of the latent path.
         tau_dim: Dimensions of tau at each step of the path.
-        psi_dim: Dimensions of psi at each step of the path.
+        psi_dim: Dimensions of psi at each step of the path; 0 makes it the SVAE of equation (elbo_simple),
+            which knows nothing of badness.
         distribution: Family of all four networks, `laplace` (the paper) or `gaussian`.
         head: Output of p(xi|tau): `dense` (the paper) or `low-rank` (ours).
         prior: p(tau, psi|x): `deconv` (the paper) or `mlp` (ours).
@@ -92,6 +92,8 @@ class ModelConfig:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
         for name in _SIZES:
             _require_positive(name, [getattr(self, name)])
+        if self.psi_dim < 0:
+            raise ValueError(f"psi_dim must be at least 1, or 0 for the SVAE, got {self.psi_dim}")
         for name in ("channels", "prior_hidden", "badness_hidden"):
             _require_positive(name, getattr(self, name))
         if encoded_length(self.time_steps, len(self.channels)) < 1:
@@ -109,6 +111,11 @@ class ModelConfig:
     def psi_size(self) -> int:
         """Elements of the flattened psi."""
         return self.path_length * self.psi_dim
+
+    @property
+    def has_psi(self) -> bool:
+        """Whether this is the SVAE-DC, and not the SVAE that sees only trajectories."""
+        return self.psi_dim > 0
 
     @property
     def latent_size(self) -> int:

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from svaedc.architecture import ModelConfig, decoded_length
-from svaedc.distributions import FAMILIES, Diagonal, bounded_scale
+from svaedc.distributions import FAMILIES, Diagonal, bounded_scale, full_precision
 from svaedc.networks import transposed_convolutions
 from svaedc.normaliser import Statistics
 
@@ -46,7 +46,8 @@ class DenseHead(nn.Module):
 
     def forward(self, tau: Float[Tensor, "batch tau"]) -> Diagonal:
         """Distribution of scaled trajectories, event `[obs, time]`."""
-        loc, raw_scale = self.output(self.trunk(tau)).unflatten(1, self.shape).unbind(1)
+        output = full_precision(self.output(self.trunk(tau)))
+        loc, raw_scale = output.unflatten(1, self.shape).unbind(1)
         return self.family(loc, bounded_scale(raw_scale, self.bounds.floor, self.bounds.cap))
 
 
@@ -86,8 +87,9 @@ class LowRankHead(nn.Module):
     def forward(self, tau: Float[Tensor, "batch tau"]) -> Diagonal:
         """Distribution of scaled trajectories, event `[obs, time]`."""
         features = self.trunk(tau)
-        residual = (self.coefficients(features) @ self.basis.flatten(1)).view(-1, *self.median.shape)
-        raw_scale = self.raw_scale(features).unsqueeze(-1) + self.raw_scale_per_step
+        product = full_precision(self.coefficients(features) @ self.basis.flatten(1))
+        residual = product.view(-1, *self.median.shape)
+        raw_scale = full_precision(self.raw_scale(features)).unsqueeze(-1) + self.raw_scale_per_step
         scale = self.spread * bounded_scale(raw_scale, self.bounds.floor, self.bounds.cap)
         return self.family(self.median + self.spread * residual, scale)
 

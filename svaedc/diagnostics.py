@@ -1,16 +1,15 @@
 """What a trained model has learnt, measured on held-out episodes, and whether it has collapsed."""
 
+from functools import partial
 from typing import Final
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from svaedc.episodes import Batch, Episodes
+from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.model import SvaeDc
 
-BATCH: Final = 256
 ACTIVE_SHARE_OF_SPREAD: Final = 0.1
 """Active: E[tau_d|x] spreads over controllers by at least this share of the aggregate posterior."""
 
@@ -22,7 +21,6 @@ REMEDIES: Final = {
 }
 
 
-@torch.no_grad()
 def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
     """Named measures of a model on held-out episodes, in evaluation mode.
 
@@ -30,11 +28,14 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
     per-step median of the training data: `norm` is the mean over dimensions of that ratio, `raw` the ratio of
     the means over all elements in parts of the observation range; 1 is no better than the median. Dimensions
     that never leave their median are left out. A correlation is NaN when the true y does not vary and 0 when
-    the predicted y does not.
+    the predicted y does not; whatever is about y is NaN for an SVAE.
 
     Returns:
-        `rec_norm`, `rec_raw`, `gen_norm`, `gen_raw`, `corr_y_rec`, `corr_y_gen`, `active_dimensions`,
-        `active_share` and the unweighted `elbo`, `log_p_xi`, `log_p_y`, `kl` per episode.
+        `rec_norm`, `rec_raw`, `gen_norm`, `gen_raw`; `corr_y_rec`, `corr_y_gen` and the mean absolute errors
+        `mae_y_rec`, `mae_y_gen`; `active_dimensions`, `active_share` and the `latent_spread/NN` of each
+        dimension that they count, the standard deviation of E[tau_d|x] over controllers in parts of that of
+        the aggregate posterior; and, per episode and unweighted, the four terms `log_p_xi`, `log_p_y`,
+        `log_p_latent` and `minus_log_q`, their sum `elbo`, and `kl`, minus the sum of the last two.
 
     Raises:
         ValueError: Fewer than two episodes: nothing varies.
@@ -42,18 +43,14 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
     if len(episodes) < 2:
         raise ValueError(f"diagnostics need at least 2 held-out episodes, got {len(episodes)}; collect more")
     device = model.normaliser.low.device
-    positions = np.arange(len(episodes))
     was_training = model.training
     model.eval()
     # A fixed seed makes the draw of q the same in every evaluation and leaves the caller's generator alone.
     with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         torch.manual_seed(0)
-        parts = [
-            _measured(model, episodes.gather(positions[start : start + BATCH], device))
-            for start in range(0, len(positions), BATCH)
-        ]
+        found = measured_over(episodes, device, partial(_measured, model))
     model.train(was_training)
-    return _summary({name: torch.cat([part[name] for part in parts]).cpu().double() for name in parts[0]})
+    return _summary({name: values.cpu().double() for name, values in found.items()})
 
 
 def collapse(metrics: dict[str, float]) -> str | None:
@@ -79,8 +76,9 @@ def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *re
         "rec_error": (model.p_xi(q_tau).loc - xi).abs().mean(-1),
         "gen_error": (model.p_xi(p_tau).loc - xi).abs().mean(-1),
         "y": batch.y,
-        "y_rec": model.p_y(q_psi).loc,
-        "y_gen": model.p_y(p_psi).loc,
+        "y_rec": _predicted(model, q_psi),
+        "y_gen": _predicted(model, p_psi),
+        "minus_log_q": q.entropy(),
         "q_tau": q_tau,
         "q_tau_variance": model.split(q.variance)[0],
         "p_tau": p_tau,
@@ -88,20 +86,29 @@ def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *re
     }
 
 
+def _predicted(model: SvaeDc, psi: Float[Tensor, "batch psi"]) -> Float[Tensor, " batch"]:
+    return model.p_y(psi).loc if model.config.has_psi else psi.new_full((len(psi),), torch.nan)
+
+
 def _summary(measured: dict[str, Tensor]) -> dict[str, float]:
     error = {name: measured[f"{name}_error"].mean(0) for name in ("median", "rec", "gen")}
     moving = error["median"] > 0.0
     aggregate_std = (measured["q_tau"].var(0) + measured["q_tau_variance"].mean(0)).sqrt()
-    active = measured["p_tau"].std(0) >= ACTIVE_SHARE_OF_SPREAD * aggregate_std
+    spread = measured["p_tau"].std(0) / aggregate_std
+    active = spread >= ACTIVE_SHARE_OF_SPREAD
     summary = {
         "active_dimensions": active.double().sum(),
         "active_share": active.double().mean(),
-        **{name: measured[name].mean() for name in ("log_p_xi", "log_p_y", "kl")},
+        **{f"latent_spread/{d:02d}": each for d, each in enumerate(spread)},
+        **{name: measured[name].mean() for name in ("log_p_xi", "log_p_y", "minus_log_q", "kl")},
     }
     for name in ("rec", "gen"):
+        summary[f"mae_y_{name}"] = (measured["y"] - measured[f"y_{name}"]).abs().mean()
         summary[f"{name}_norm"] = (error[name] / error["median"])[moving].mean()
         summary[f"{name}_raw"] = error[name].mean() / error["median"].mean()
         summary[f"corr_y_{name}"] = _correlation(measured["y"], measured[f"y_{name}"])
+    # KL(q || p) = E[log q] - E[log p], so the closed form of the cross entropy needs no other sample.
+    summary["log_p_latent"] = -summary["kl"] - summary["minus_log_q"]
     summary["elbo"] = summary["log_p_xi"] + summary["log_p_y"] - summary["kl"]
     return {name: float(value) for name, value in summary.items()}
 

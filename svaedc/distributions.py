@@ -45,6 +45,15 @@ class Diagonal(ABC):
     def variance(self) -> Float[Tensor, "batch *event"]:
         """Variance of each element."""
 
+    def entropy(self) -> Float[Tensor, " batch"]:
+        """-E[log q] of each row in closed form, summed over the event."""
+        return summed_over_event(self.scale.log() + self._standard_entropy)
+
+    @property
+    @abstractmethod
+    def _standard_entropy(self) -> float:
+        """Entropy of one element of the standard distribution."""
+
     @abstractmethod
     def _log_density(self, standardised: Tensor) -> Tensor:
         """Log density of the standard distribution (loc 0, scale 1)."""
@@ -72,6 +81,10 @@ class DiagonalLaplace(Diagonal):
         """Variance of each element, 2 b^2."""
         return 2.0 * self.scale.square()
 
+    @property
+    def _standard_entropy(self) -> float:
+        return 1.0 + math.log(2.0)
+
     def _log_density(self, standardised: Tensor) -> Tensor:
         return -standardised.abs() - math.log(2.0)
 
@@ -98,6 +111,10 @@ class DiagonalGaussian(Diagonal):
     def variance(self) -> Float[Tensor, "batch *event"]:
         """Variance of each element, sigma^2."""
         return self.scale.square()
+
+    @property
+    def _standard_entropy(self) -> float:
+        return 0.5 * math.log(2.0 * math.pi * math.e)
 
     def _log_density(self, standardised: Tensor) -> Tensor:
         return -0.5 * standardised.square() - 0.5 * math.log(2.0 * math.pi)
@@ -138,6 +155,11 @@ def kl_divergence(q: Diagonal, p: Diagonal) -> Float[Tensor, " batch"]:
 def summed_over_event(elements: Float[Tensor, "batch *event"]) -> Float[Tensor, " batch"]:
     """Sum of everything but the batch dimension; a batch of scalars stays as it is."""
     return elements.reshape(elements.shape[0], -1).sum(-1)
+
+
+def full_precision(values: Float[Tensor, "*shape"]) -> Float[Tensor, "*shape"]:
+    """Float32 of what mixed precision computed in fewer bits: densities and their sums need them all."""
+    return values.float() if values.dtype.itemsize < 4 else values
 
 
 def bounded_scale(raw: Float[Tensor, "*shape"], floor: float, cap: float) -> Float[Tensor, "*shape"]:

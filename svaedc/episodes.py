@@ -1,12 +1,15 @@
 """Rows of a training cache as the model sees them, gathered in batches from arrays or memory maps."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
 from jaxtyping import Float, Float32, Integer
 from torch import Tensor
+
+_MEASURED_TOGETHER: Final = 256
 
 
 class Batch(NamedTuple):
@@ -71,6 +74,33 @@ class Episodes:
     def sample(self, count: int, rng: np.random.Generator) -> "Episodes":
         """At most `count` of the episodes, drawn without replacement, in storage order."""
         return replace(self, rows=self.rows[np.sort(rng.permutation(len(self))[:count])])
+
+
+def measured_over(
+    episodes: Episodes, device: torch.device, measure: Callable[[Batch], dict[str, Tensor]]
+) -> dict[str, Tensor]:
+    """What `measure` says of each episode, batch after batch, without gradients.
+
+    The results are allocated as a whole beforehand: small tensors kept from each batch would sit between the
+    large ones that are freed, and memory would grow with the number of episodes.
+
+    Args:
+        episodes: At least one.
+        device: Where batches and results are.
+        measure: Tensors with one row per episode of a batch, by name.
+    """
+    results: dict[str, Tensor] = {}
+    with torch.no_grad():
+        for start in range(0, len(episodes), _MEASURED_TOGETHER):
+            positions = np.arange(start, min(start + _MEASURED_TOGETHER, len(episodes)))
+            found = measure(episodes.gather(positions, device))
+            if not results:
+                results = {
+                    name: part.new_empty(len(episodes), *part.shape[1:]) for name, part in found.items()
+                }
+            for name, part in found.items():
+                results[name][start : start + len(positions)] = part
+    return results
 
 
 def split(episodes: Episodes, controller: Integer[np.ndarray, " episodes"]) -> tuple[Episodes, Episodes]:

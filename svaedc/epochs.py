@@ -14,9 +14,10 @@ from torch import Tensor, nn
 from svaedc.diagnostics import evaluate
 from svaedc.episodes import Episodes
 from svaedc.model import SvaeDc
-from svaedc.sampling import Shard, batches
+from svaedc.sampling import Order, batches
 from svaedc.settings import TrainingSettings, optimiser_of
 from svaedc.stages import JointStage, PriorStage, Stage
+from svaedc.workplace import Workplace
 
 TrainingState = dict[str, Any]
 """Plain values and tensors for `torch.save`; `torch.load(weights_only=True)` reads them back."""
@@ -31,7 +32,7 @@ class EpochReport:
     Attributes:
         stage: `joint` or `prior`.
         epoch: Epochs of this stage that are done.
-        update: Updates of all stages that are done.
+        update: Updates of all stages that are done, those counted in that a stage left out by stopping early.
         updates: Updates of all stages together.
         metrics: `train/...` means over the epoch and `held_out/...` diagnostics.
         state: From here training continues as if never interrupted; a copy, so it may be kept.
@@ -58,7 +59,8 @@ class Run:
     training: Episodes
     held_out: Episodes
     settings: TrainingSettings
-    shard: Shard
+    order: Order
+    workplace: Workplace
 
     def load(self, state: TrainingState) -> None:
         """Put saved weights into the model."""
@@ -99,10 +101,17 @@ class Loop:
         for epoch in range(done, -(-total // size)):
             updates = range(epoch * size, min((epoch + 1) * size, total))
             metrics = self._epoch(epoch, updates)
-            extra = self._stage.end_epoch()
-            if updates.stop == total:
+            held_out = evaluate(self._run.model, self._measured_on)
+            best = self._stage.end_epoch(held_out)
+            is_over = updates.stop == total or self._run.workplace.agree(self._stage.is_stale)
+            if is_over:
                 self._stage.finish()
-            yield self._report(epoch + 1, updates.stop, metrics, extra)
+                held_out = evaluate(self._run.model, self._measured_on)
+            metrics |= {f"held_out/{name}": value for name, value in held_out.items()}
+            metrics["held_out/best_loss"] = best
+            yield self._report(epoch + 1, total if is_over else updates.stop, metrics)
+            if is_over:
+                return
 
     def _epoch(self, epoch: int, updates: range) -> dict[str, float]:
         """Means of the training terms over the epoch's updates."""
@@ -112,10 +121,12 @@ class Loop:
         self._stage.begin_epoch()
         sums: dict[str, Tensor] = {}
         with torch.random.fork_rng(devices=devices):
-            entropy = np.random.SeedSequence((*seed, epoch, run.shard.rank))
+            shard = run.workplace.shard
+            entropy = np.random.SeedSequence((*seed, epoch, shard.rank))
             torch.manual_seed(int(entropy.generate_state(1)[0]))
-            order = batches(len(run.training), run.settings.batch_size, run.shard, seed, updates)
-            for update, positions in zip(updates, order, strict=True):
+            size = run.settings.batch_size
+            shares = batches(len(run.training), size, shard, seed, updates, run.order)
+            for update, positions in zip(updates, shares, strict=True):
                 for name, value in self._update(update, positions).items():
                     sums[name] = sums.get(name, torch.zeros_like(value)) + value
         means = {f"train/{name}": float(total) / len(updates) for name, total in sums.items()}
@@ -131,29 +142,28 @@ class Loop:
         for group in self._optimiser.param_groups:
             group["lr"] = settings.learning_rate_at(update)
         self._stage.progress = update / settings.updates
-        loss, terms = self._stage.loss(self._wrapped, positions)
+        with self._run.workplace.autocast(self._device):
+            loss, terms = self._stage.loss(self._wrapped, positions)
         self._optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._stage.module.parameters(), settings.gradient_norm)
         self._optimiser.step()
         return {"loss": loss.detach()} | {name: value.detach() for name, value in terms.items()}
 
-    def _report(
-        self, epoch: int, done: int, metrics: dict[str, float], extra: dict[str, float]
-    ) -> EpochReport:
+    def _report(self, epoch: int, done: int, metrics: dict[str, float]) -> EpochReport:
         run, stage = self._run, self._stage
-        held_out = evaluate(run.model, self._measured_on) | extra
         earlier = sum(run.budget(name) for name in STAGES[: STAGES.index(stage.name)])
         return EpochReport(
             stage=stage.name,
             epoch=epoch,
             update=earlier + done,
             updates=sum(run.budget(name) for name in STAGES),
-            metrics=metrics | {f"held_out/{name}": value for name, value in held_out.items()},
+            metrics=metrics,
             state=deepcopy(
                 {
                     "stage": stage.name,
                     "epoch": epoch,
+                    "is_over": done == stage.settings.updates,
                     "settings": run.settings.to_dict(),
                     "model": run.model.state_dict(),
                     "optimiser": self._optimiser.state_dict(),

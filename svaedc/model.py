@@ -39,6 +39,9 @@ class SvaeDc(nn.Module):
 
     Generative: p(tau, psi, xi, y | x) = p(tau, psi|x) p(y|psi) p(xi|tau). Posterior: q(tau, psi | xi, y).
     Trajectories go in and come out in SI units, channel-major; controllers live in the unit cube.
+
+    Without psi (`ModelConfig.psi_dim` 0) it is the SVAE of equation (elbo_simple): log p(y|psi) is left out,
+    and the predicted badness is 0 everywhere, so that nothing is compressed.
     """
 
     def __init__(self, config: ModelConfig) -> None:
@@ -49,7 +52,7 @@ class SvaeDc(nn.Module):
         self.posterior_network = Encoder(config)
         self.prior_network = PRIORS[config.prior](config)
         self.decoder: DenseHead | LowRankHead = HEADS[config.head](config)
-        self.badness = Badness(config)
+        self.badness = Badness(config) if config.has_psi else None
 
     def forward(
         self,
@@ -63,7 +66,7 @@ class SvaeDc(nn.Module):
         tau, psi = self.split(q.rsample())
         return ElboTerms(
             log_p_xi=self.p_xi(tau).log_prob(self.normaliser.scaled(xi)),
-            log_p_y=self.p_y(psi).log_prob(y),
+            log_p_y=self.p_y(psi).log_prob(y) if self.config.has_psi else torch.zeros_like(y),
             kl=kl_divergence(q, self.prior(x)),
         )
 
@@ -97,8 +100,18 @@ class SvaeDc(nn.Module):
         return self.decoder(tau)
 
     def p_y(self, psi: Float[Tensor, "batch psi"]) -> Diagonal:
-        """p(y | psi), event without dimensions."""
+        """p(y | psi), event without dimensions.
+
+        Raises:
+            TypeError: An SVAE has no psi.
+        """
+        if self.badness is None:
+            raise TypeError("p(y|psi) needs a model with psi, got an SVAE (psi_dim 0); train an SVAE-DC")
         return self.badness(psi)
+
+    def badness_at(self, psi: Float[Tensor, "batch psi"]) -> Float[Tensor, " batch"]:
+        """Mean of p(y | psi), in (0, 1); 0 everywhere for an SVAE, which knows nothing of badness."""
+        return self.p_y(psi).loc if self.config.has_psi else psi.new_zeros(len(psi))
 
     def split(
         self, code: Float[Tensor, "batch latent"]
@@ -111,7 +124,7 @@ class SvaeDc(nn.Module):
     ) -> tuple[Float[Tensor, "batch tau"], Float[Tensor, " batch"]]:
         """E[tau|x], flattened, and the mean of p(y|psi_bar_x), what the kernels are made of (section 4)."""
         tau, psi = self.split(self.prior(x).loc)
-        return tau, self.p_y(psi).loc
+        return tau, self.badness_at(psi)
 
     def generate(self, x: Float[Tensor, "batch controller"]) -> Float[Tensor, "batch obs time"]:
         """Trajectory of each controller, decoded from the mean of p(tau|x), in SI units."""

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from svaedc.architecture import KERNEL, STRIDE, ModelConfig, decoded_length, encoded_length
-from svaedc.distributions import FAMILIES, Diagonal, bounded_scale
+from svaedc.distributions import FAMILIES, Diagonal, bounded_scale, full_precision
 
 
 def convolutions(channels: Sequence[int]) -> nn.Sequential:
@@ -37,7 +37,7 @@ class LatentHead(nn.Module):
 
     def forward(self, features: Float[Tensor, "batch features"]) -> Diagonal:
         """Distribution of the latent code, event `[latent]`."""
-        loc, raw_scale = self.linear(features).chunk(2, dim=-1)
+        loc, raw_scale = full_precision(self.linear(features)).chunk(2, dim=-1)
         return self.family(loc, bounded_scale(raw_scale, self.bounds.floor, self.bounds.cap))
 
 
@@ -46,15 +46,18 @@ class Encoder(nn.Module):
     """q(tau, psi | xi, y): convolutions with observations as channels and time as the sequence (section 5).
 
     The per-step bad indicator is one more channel; y itself joins at the linear layer, because under a
-    training stride it is no longer the mean of the indicators that are seen.
+    training stride it is no longer the mean of the indicators that are seen. The SVAE's q(tau | xi) sees
+    neither.
     """
 
     def __init__(self, config: ModelConfig) -> None:
         """Build from the sizes in `config`."""
         super().__init__()
-        self.convolutions = convolutions((config.observation_dim + 1, *config.channels))
+        self.sees_badness = config.has_psi
+        extra = int(config.has_psi)
+        self.convolutions = convolutions((config.observation_dim + extra, *config.channels))
         length = encoded_length(config.time_steps, len(config.channels))
-        self.latent = LatentHead(config.channels[-1] * length + 1, config)
+        self.latent = LatentHead(config.channels[-1] * length + extra, config)
 
     def forward(
         self,
@@ -63,6 +66,8 @@ class Encoder(nn.Module):
         y: Float[Tensor, " batch"],
     ) -> Diagonal:
         """Posterior of the latent code given normalised trajectories."""
+        if not self.sees_badness:
+            return self.latent(self.convolutions(xi).flatten(1))
         features = self.convolutions(torch.cat([xi, bad.unsqueeze(1)], dim=1)).flatten(1)
         return self.latent(torch.cat([features, y.unsqueeze(1)], dim=1))
 
@@ -117,7 +122,7 @@ class Badness(nn.Module):
 
     def forward(self, psi: Float[Tensor, "batch psi"]) -> Diagonal:
         """Distribution of y, an event without dimensions."""
-        raw_loc, raw_scale = self.output(self.hidden(psi)).unbind(-1)
+        raw_loc, raw_scale = full_precision(self.output(self.hidden(psi))).unbind(-1)
         return self.family(
             torch.sigmoid(raw_loc), bounded_scale(raw_scale, self.bounds.floor, self.bounds.cap)
         )

@@ -20,7 +20,7 @@ from svaedc.history import History
 RESTARTS: Final = 5
 RAW_SAMPLES: Final = 256
 """Points that `optimize_acqf` draws, to start from the most promising ones."""
-ITERATIONS: Final = 50
+ITERATIONS: Final = 200
 """Of L-BFGS from each of them."""
 DRAWS: Final = 64
 """Random controllers from which the first allowed one is taken."""

@@ -54,6 +54,8 @@ class StageSettings:
         weight_decay: Of the optimiser.
         dropout: Between the hidden layers of p(tau, psi|x).
         gradient_norm: Gradients are scaled down to at most this norm.
+        patience: Epochs without a better held-out loss after which the stage ends and puts its best epoch
+            back; infinite for a stage that uses up its budget.
     """
 
     updates: int
@@ -63,6 +65,7 @@ class StageSettings:
     weight_decay: float
     dropout: float
     gradient_norm: float
+    patience: float = math.inf
 
     def __post_init__(self) -> None:
         """Refuse unknown names and values outside their ranges."""
@@ -74,10 +77,10 @@ class StageSettings:
                 "updates and weight_decay must be at least 0 and learning_rate above it, got "
                 f"{self.updates}, {self.weight_decay} and {self.learning_rate}"
             )
-        if not (0.0 <= self.dropout < 1.0 and self.gradient_norm > 0.0):
+        if not (0.0 <= self.dropout < 1.0 and self.gradient_norm > 0.0 and self.patience >= 1.0):
             raise ValueError(
-                "dropout must be in [0, 1) and gradient_norm above 0, got "
-                f"{self.dropout} and {self.gradient_norm}"
+                "dropout must be in [0, 1), gradient_norm above 0 and patience at least 1, got "
+                f"{self.dropout}, {self.gradient_norm} and {self.patience}"
             )
 
     def learning_rate_at(self, update: int) -> float:

@@ -1,19 +1,18 @@
 """The two stages of training: the whole bound, then p(tau, psi|x) alone."""
 
+import math
 from abc import ABC, abstractmethod
-from typing import Any, Final, final
+from typing import Any, final
 
 import numpy as np
 import torch
 from jaxtyping import Float, Integer
 from torch import Tensor, nn
 
-from svaedc.distributions import Diagonal, kl_divergence
-from svaedc.episodes import Episodes
+from svaedc.distributions import FAMILIES, Diagonal, kl_divergence
+from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.model import SvaeDc
 from svaedc.settings import StageSettings, TrainingSettings
-
-_ENCODING_BATCH: Final = 256
 
 
 class Stage(ABC):
@@ -34,7 +33,7 @@ class Stage(ABC):
     def __init__(self) -> None:
         """Start at the stage's beginning."""
         self.progress = 0.0
-        self.memory: dict[str, Any] = {}
+        self.memory: dict[str, Any] = {"best_loss": math.inf, "stale": 0}
 
     @abstractmethod
     def loss(
@@ -46,12 +45,38 @@ class Stage(ABC):
         """
 
     @abstractmethod
-    def end_epoch(self) -> dict[str, float]:
-        """Extra held-out measures after an epoch."""
+    def held_out_loss(self, metrics: dict[str, float]) -> float:
+        """What the stage minimises, on held-out episodes; `metrics` are the diagnostics of this epoch."""
 
+    @property
     @abstractmethod
+    def keeps_best(self) -> bool:
+        """Whether the best epoch is the one to use, and not the last."""
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the held-out loss has not become better for longer than the stage's patience."""
+        return self.memory["stale"] >= self.settings.patience
+
+    def end_epoch(self, metrics: dict[str, float]) -> float:
+        """Remember this epoch if it is the best so far; returns the best held-out loss so far."""
+        loss = self.held_out_loss(metrics)
+        if loss < self.memory["best_loss"]:
+            self._remember(loss)
+        else:
+            self.memory["stale"] += 1
+        return self.memory["best_loss"]
+
     def finish(self) -> None:
         """Leave the model as it is to be used."""
+        if self.keeps_best:
+            self.module.load_state_dict(self.memory["best"])
+
+    def _remember(self, loss: float) -> None:
+        self.memory = {"best_loss": loss, "stale": 0}
+        if self.keeps_best:
+            best = {name: value.clone() for name, value in self.module.state_dict().items()}
+            self.memory["best"] = best
 
     def begin_epoch(self) -> None:
         """Set training mode and this stage's dropout."""
@@ -86,12 +111,16 @@ class JointStage(Stage):
         terms = {"elbo": log_p_xi + log_p_y - kl, "log_p_xi": log_p_xi, "log_p_y": log_p_y, "kl": kl}
         return -weighted / self._elements, terms
 
-    def end_epoch(self) -> dict[str, float]:
-        """Nothing beyond the usual diagnostics."""
-        return {}
+    def held_out_loss(self, metrics: dict[str, float]) -> float:
+        """Negative bound at its final weights, per element of xi."""
+        weights = self._weighting
+        weighted = metrics["log_p_xi"] + weights.y * metrics["log_p_y"] - weights.kl * metrics["kl"]
+        return -weighted / self._elements
 
-    def finish(self) -> None:
-        """The last weights are the ones to use."""
+    @property
+    def keeps_best(self) -> bool:
+        """Only with early stopping: a decaying learning rate makes the last epoch the best one."""
+        return math.isfinite(self.settings.patience)
 
 
 @final
@@ -112,8 +141,7 @@ class PriorRefit(nn.Module):
 class PriorStage(Stage):
     """Stage two, a departure: p(tau, psi|x) goes on alone, regularised; its best held-out epoch is kept.
 
-    Posteriors no longer change, so they are computed once. Keeping the best epoch instead of stopping there
-    means that no worker has to agree with another on when to stop.
+    Posteriors no longer change, so they are computed once.
     """
 
     name = "prior"
@@ -127,7 +155,7 @@ class PriorStage(Stage):
         self.settings = settings.prior
         self._training = posteriors(model, training)
         self._held_out = posteriors(model, held_out)
-        self._remember(self._held_out_kl())
+        self._remember(self.held_out_loss({}))
 
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
@@ -138,38 +166,25 @@ class PriorStage(Stage):
         kl = wrapped(x[rows], type(q)(q.loc[rows], q.scale[rows])).mean()
         return kl, {"kl": kl}
 
-    def end_epoch(self) -> dict[str, float]:
-        """Keep this epoch's network if it is the best so far."""
-        kl = self._held_out_kl()
-        if kl < self.memory["best_kl"]:
-            self._remember(kl)
-        return {"best_kl": self.memory["best_kl"]}
-
-    def finish(self) -> None:
-        """Put the best epoch's network back."""
-        self.module.load_state_dict(self.memory["best"])
-
-    def _remember(self, kl: float) -> None:
-        best = {name: value.clone() for name, value in self.module.state_dict().items()}
-        self.memory = {"best": best, "best_kl": kl}
-
     @torch.no_grad()
-    def _held_out_kl(self) -> float:
+    def held_out_loss(self, metrics: dict[str, float]) -> float:  # noqa: ARG002 - all episodes, not a sample
+        """KL(q || p(.|x)) of all held-out episodes."""
         self.module.eval()
         return float(self.module(*self._held_out).mean())
 
+    @property
+    def keeps_best(self) -> bool:
+        """Always: this stage overfits, and what joint training left is its first candidate."""
+        return True
 
-@torch.no_grad()
+
 def posteriors(model: SvaeDc, episodes: Episodes) -> tuple[Float[Tensor, "episodes controller"], Diagonal]:
     """Controllers and q(tau, psi|xi, y) of all episodes, in evaluation mode."""
-    device = next(model.parameters()).device
-    model.eval()
-    controllers, locs, scales = [], [], []
-    for start in range(0, len(episodes), _ENCODING_BATCH):
-        positions = np.arange(start, min(start + _ENCODING_BATCH, len(episodes)))
-        batch = episodes.gather(positions, device)
+
+    def encoded(batch: Batch) -> dict[str, Tensor]:
         q = model.posterior(batch.xi, batch.bad, batch.y)
-        controllers.append(batch.x)
-        locs.append(q.loc)
-        scales.append(q.scale)
-    return torch.cat(controllers), type(q)(torch.cat(locs), torch.cat(scales))
+        return {"x": batch.x, "loc": q.loc, "scale": q.scale}
+
+    model.eval()
+    found = measured_over(episodes, next(model.parameters()).device, encoded)
+    return found["x"], FAMILIES[model.config.distribution](found["loc"], found["scale"])

@@ -1,6 +1,6 @@
 """Any setup as a Gymnasium environment, for people who bring their own controller."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from workers.environments.environment import Channel, Observed
-from workers.rollout import diverged_objective, sane_steps
+from workers.rollout import DIVERGED, diverged_objective, sane_steps
 from workers.setups import Setup
 
 
@@ -19,13 +19,14 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     |---|---|
     | action | the setup's command channels, in their units, clipped to their bounds |
     | observation | ξ at this step: the setup's observation channels, in their units |
-    | reward | 0 in every step but the last, where it is f over the whole episode |
+    | reward | 0 in every step but the last, where it is f of the whole episode |
     | start | the setup's start pose; physics drawn from the ranges of data collection |
-    | end | truncated after the setup's horizon; terminated when the simulation explodes |
+    | end | truncated after the setup's horizon; terminated by its stop rule or an explosion |
 
     An episode that explodes is bad, ends with its last sane observation and has f's lower limit for a reward,
-    as in a rollout. `info` holds `bad`, whether a bad condition holds, and after `reset` the episode's
-    `physics`.
+    as in a rollout. A stopped one is bad in its last step and has the task's objective of a stopped episode.
+    `info` holds `bad`, whether a bad condition holds or how bad the step is (G_bad sees that step alone),
+    after `reset` the episode's `physics`, and when terminated the reason as `stop`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -48,7 +49,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._records = []
         observed = self._environment.observed([self._environment.record()])
         self._last = self._row(observed)
-        return self._last, {"physics": physics, "bad": bool(self._setup.task.is_bad(observed).any())}
+        return self._last, {"physics": physics, "bad": self._bad(observed)}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply one command for one control step."""
@@ -56,12 +57,16 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         record = self._environment.step(command)
         observed = self._environment.observed([record])
         if not sane_steps(observed.xi, self._setup.observation):
-            return self._last, diverged_objective(self._setup), True, False, {"bad": True}
+            return self._last, diverged_objective(self._setup), True, False, _ended(DIVERGED)
         self._records.append(record)
         self._last = self._row(observed)
-        ended = len(self._records) >= self._setup.horizon
-        bad = bool(self._setup.task.is_bad(observed).any())
-        return self._last, self._objective() if ended else 0.0, False, ended, {"bad": bad}
+        reason = self._setup.stop(observed)
+        if reason:
+            reward = self._objective(self._setup.task.stopped_objective)
+            return self._last, reward, True, False, _ended(reason)
+        truncated = len(self._records) >= self._setup.horizon
+        reward = self._objective(self._setup.task.objective) if truncated else 0.0
+        return self._last, reward, False, truncated, {"bad": self._bad(observed)}
 
     def close(self) -> None:
         """End the simulation."""
@@ -70,9 +75,17 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     def _row(self, observed: Observed) -> np.ndarray:
         return np.clip(observed.xi[:, 0], self._seen.low, self._seen.high)
 
-    def _objective(self) -> float:
+    def _bad(self, observed: Observed) -> bool | float:
+        return self._setup.task.is_bad(observed).max().item()
+
+    def _objective(self, of: Callable[[Observed, np.ndarray], float]) -> float:
         whole = self._environment.observed(self._records)
-        return self._setup.task.objective(whole, self._setup.task.is_bad(whole))
+        return of(whole, self._setup.task.is_bad(whole))
+
+
+def _ended(reason: str) -> dict[str, Any]:
+    """The `info` of a step that ended an episode before its horizon."""
+    return {"bad": True, "stop": reason}
 
 
 def _box(channels: Sequence[Channel]) -> spaces.Box:

@@ -29,6 +29,10 @@ class PhysicsRanges:
                 )
         object.__setattr__(self, "intervals", MappingProxyType(dict(self.intervals)))
 
+    def __str__(self) -> str:
+        """As `ranges` reads it, in the order of the names: equal texts for equal ranges."""
+        return ",".join(f"{name}={low}:{high}" for name, (low, high) in sorted(self.intervals.items()))
+
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """One value per parameter, uniform in its interval, drawn in the order of the names."""
         return {name: float(rng.uniform(low, high)) for name, (low, high) in sorted(self.intervals.items())}
@@ -37,3 +41,24 @@ class PhysicsRanges:
 def around(nominal: Mapping[str, float], spread: float) -> PhysicsRanges:
     """Every parameter within ±spread of its nominal value (0.05 is five per cent)."""
     return PhysicsRanges({name: (v * (1 - spread), v * (1 + spread)) for name, v in nominal.items()})
+
+
+def ranges(text: str) -> PhysicsRanges:
+    """Ranges written as `friction=1:2.5,restitution=0.05`; a single number is a range of one value.
+
+    Raises:
+        ValueError: when a part is not of that form, a parameter is named twice, or a range is impossible.
+    """
+    intervals: dict[str, tuple[float, float]] = {}
+    for part in text.split(","):
+        name, _, numbers = (each.strip() for each in part.partition("="))
+        low, colon, high = numbers.partition(":")
+        if name in intervals:
+            raise ValueError(f"physics range of {name} must be given once, got {text!r}")
+        try:
+            intervals[name] = (float(low), float(high if colon else low))
+        except ValueError:
+            raise ValueError(
+                f"a physics range must be written NAME=LOW:HIGH or NAME=VALUE, got {part.strip()!r}"
+            ) from None
+    return PhysicsRanges(intervals)

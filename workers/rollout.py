@@ -11,20 +11,26 @@ Example:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
-from workers.controllers.controller import unit_cube
+from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
+from workers.tasks.stop import STOPPED, never
+from workers.tasks.task import Bad
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
 
 DIVERGED = "diverged"
+
+Stored = UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
+"""Per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +40,21 @@ class Episode:
     Attributes:
         x: the controller, in [0,1]^D.
         xi: the trajectory ξ, in the units of the setup's channels.
-        bad: per step, one bit for each bad condition.
-        y: badness, the fraction of bad steps, in [0, 1].
+        bad: per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad.
+        y: badness, the fraction of bad steps or the mean degree, in [0, 1].
         f: the objective.
-        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded.
+        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded, or
+            the reason of the setup's stop rule. From there on ξ repeats the last state.
         physics: the parameters it ran under.
+
+    A diverged episode is bad throughout, and no model may learn from it. A stopped one is a fact about its
+    controller, and may be learnt from: the step that gave the reason and all that were not run are bad as
+    `stopped`; those before have the conditions that were seen, and f is the task's `stopped_objective`.
     """
 
     x: Float32[np.ndarray, " d"]
     xi: Float32[np.ndarray, "obs time"]
-    bad: UInt8[np.ndarray, " time"]
+    bad: Stored
     y: float
     f: float
     stop: str
@@ -65,9 +76,12 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     controller = unit_cube(x, setup.dimensions)
     environment.reset(physics)
     command = setup.controller.start(controller, environment, setup.horizon)
-    step = environment.step
-    records = [step(command(t)) for t in range(setup.horizon)]
-    return _episode(setup, environment.observed(records), controller, physics)
+    if setup.stop is never:
+        step = environment.step
+        records, reason = [step(command(t)) for t in range(setup.horizon)], ""
+    else:
+        records, reason = _guarded(setup, environment, command)
+    return _episode(setup, environment.observed(records), reason, controller, physics)
 
 
 def random_episode(
@@ -86,31 +100,60 @@ def random_episode(
     return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
 
 
-def _episode(setup: Setup, observed: Observed, x: np.ndarray, physics: Physics) -> Episode:
-    sane = sane_steps(observed.xi, setup.observation)
-    if sane < setup.horizon:
-        return _diverged(setup, observed, sane, x, physics)
+def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
+    """The records up to the step at which the setup's rule stops, that one included, and its reason."""
+    records = []
+    for t in range(setup.horizon):
+        records.append(environment.step(command(t)))
+        reason = setup.stop(environment.observed(records[-1:]))
+        if reason:
+            return records, reason
+    return records, ""
+
+
+def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:
+    sane, steps = sane_steps(observed.xi, setup.observation), observed.xi.shape[1]
+    if sane < steps:
+        return _diverged(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
+    objective = setup.task.stopped_objective if reason else setup.task.objective
+    bad = _stopped(_stored(is_bad), setup) if reason else _stored(is_bad)
     return Episode(
         x=x,
-        xi=observed.xi,
-        bad=_bits(is_bad),
-        y=float(is_bad.any(axis=0).mean()),
-        f=float(np.float32(setup.task.objective(observed, is_bad))),
-        stop="",
+        xi=_held(observed.xi, setup.horizon),
+        bad=bad,
+        y=float(degrees(bad).mean(dtype=np.float64)),
+        f=float(np.float32(objective(observed, is_bad))),
+        stop=reason,
         physics=physics,
     )
 
 
-def _diverged(setup: Setup, observed: Observed, sane: int, x: np.ndarray, physics: Physics) -> Episode:
-    """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
-    xi = observed.xi.copy()
-    if sane == 0:
-        xi[:] = np.array([(channel.low + channel.high) / 2 for channel in setup.observation])[:, None]
+def _stopped(bad: UInt8[np.ndarray, " run"] | Float32[np.ndarray, " run"], setup: Setup) -> Stored:
+    """All T steps: `stopped` from the last that was run, and nothing else where none was; degrees of 1."""
+    whole = np.zeros(setup.horizon, dtype=bad.dtype)
+    whole[: len(bad)] = bad
+    if setup.task.graded:
+        whole[len(bad) - 1 :] = 1.0
     else:
-        xi[:, sane:] = xi[:, sane - 1 : sane]
-    bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
-    return Episode(x, xi, bad, 1.0, diverged_objective(setup), DIVERGED, physics)
+        whole[len(bad) - 1 :] |= np.uint8(1 << setup.conditions.index(STOPPED))
+    return whole
+
+
+def _held(xi: Float32[np.ndarray, "obs run"], horizon: int) -> Float32[np.ndarray, "obs time"]:
+    """The trajectory with its last state repeated up to the horizon."""
+    missing = horizon - xi.shape[1]
+    return np.pad(xi, ((0, 0), (0, missing)), mode="edge") if missing else xi
+
+
+def _diverged(
+    setup: Setup, sane: Float32[np.ndarray, "obs sane"], x: np.ndarray, physics: Physics
+) -> Episode:
+    """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
+    if not sane.size:
+        sane = np.array([[(channel.low + channel.high) / 2] for channel in setup.observation], np.float32)
+    bad = _stored(np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool))
+    return Episode(x, _held(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
 def diverged_objective(setup: Setup) -> float:
@@ -127,6 +170,11 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     return int(insane[0]) if insane.size else xi.shape[1]
 
 
-def _bits(is_bad: Bool[np.ndarray, "conditions time"]) -> UInt8[np.ndarray, " time"]:
-    """One bit per condition, the first condition lowest."""
-    return np.packbits(is_bad, axis=0, bitorder="little")[0]
+def degrees(bad: Stored) -> Bool[np.ndarray, " time"] | Float32[np.ndarray, " time"]:
+    """How bad each step is: the degree itself, or whether any bit is set."""
+    return bad if bad.dtype == np.float32 else bad != 0
+
+
+def _stored(is_bad: Bad) -> Stored:
+    """Degrees as they are; otherwise one bit per condition, the first condition lowest."""
+    return is_bad[0] if is_bad.dtype == np.float32 else np.packbits(is_bad, axis=0, bitorder="little")[0]

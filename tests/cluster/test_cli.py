@@ -1,6 +1,7 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -28,7 +29,7 @@ COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
 def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
     result = svaedc("--help", folder=tmp_path)
     assert result.returncode == 0
-    for command in ("demo", "collect", "train", "compare", "ui", "dataset", "hardware"):
+    for command in ("demo", "collect", "train", "compare", "render", "ui", "dataset", "hardware"):
         assert command in result.stdout
     loaded = (
         "import cluster.cli, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"
@@ -78,6 +79,8 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     assert info.returncode == 0, info.stderr
     assert "16 in 2 shards" in info.stdout
     assert "object_tipped" in info.stdout
+    assert re.search(r"diverged +0\b", info.stdout)
+    assert re.search(r"stopped +0\b", info.stdout)
     assert svaedc("dataset", "verify", str(small_dataset), folder=tmp_path).returncode == 0
     broken = tmp_path / "broken"
     broken.mkdir()
@@ -91,7 +94,7 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     result = svaedc("dataset", "verify", str(broken), folder=tmp_path)
     assert result.returncode == 1
     assert victim.name in result.stdout
-    assert "recomputes exactly those episodes" in result.stderr
+    assert f"`svaedc dataset repair {broken}` recomputes what is broken" in result.stderr
 
 
 def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
@@ -109,7 +112,9 @@ def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
 def test_a_gap_is_told_from_damage_and_condemns_no_file(small_dataset, tmp_path):
     gappy = tmp_path / "gappy"
     shutil.copytree(small_dataset, gappy)
-    min(gappy.glob("*.parquet")).unlink()
+    first = min(gappy.glob("*.parquet"))
+    first.unlink()
+    first.with_name(f"{first.name}.sha256").unlink()
     result = svaedc("dataset", "verify", str(gappy), folder=tmp_path)
     assert result.returncode == 1
     assert result.stdout == "episodes 0 to 7 are not collected yet\n"

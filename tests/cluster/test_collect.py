@@ -5,17 +5,18 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cluster.collect import _note_failure, _pool, collect
+from cluster.collect import collect
+from cluster.collection_work import note_failure, rollout_pool
 from cluster.config import CollectSettings
 from cluster.dataset_commands import info
 from cluster.errors import UserError
@@ -28,7 +29,8 @@ from workers import setups
 from workers.collection import collect_shard
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.publication import WRITING
+from workers.dataset.inventory import inventory
+from workers.dataset.publication import WRITING, host, writer
 from workers.dataset.shards import Shard, digest_path
 from workers.dataset.verification import verify
 
@@ -225,7 +227,7 @@ def test_a_failing_disk_is_no_shards_failed_attempt(tmp_path, number):
     dataset = create(tmp_path, identity_of(setups.load("franka"), seed=0, episodes_per_shard=8))
     cause = OSError(number, os.strerror(number))
     with pytest.raises(UserError, match=rf"{os.strerror(number)}.*make room"):
-        _note_failure(Failed(Shard(0, 8), str(cause), str(cause), cause, 2), dataset, Tally())
+        note_failure(Failed(Shard(0, 8), str(cause), str(cause), cause, 2), dataset, Tally())
     assert not (tmp_path / "quarantine").exists()
 
 
@@ -233,14 +235,12 @@ def test_a_failing_disk_is_no_shards_failed_attempt(tmp_path, number):
 def test_a_machine_with_other_libraries_collects_nothing_and_names_them(tmp_path):
     identity = identity_of(setups.load("franka"), seed=0, episodes_per_shard=8)
     dataset = create(tmp_path / "dataset", replace(identity, numpy="1.0", pybullet="2.0"))
-    differ = (
-        rf"{socket.gethostname()} would roll out other episodes .* differ in pybullet: 2\.0 and .*numpy: 1\.0"
-    )
+    differ = rf"{host()} would roll out other episodes .* differ in pybullet: 2\.0 and .*numpy: 1\.0"
     with pytest.raises(ValueError, match=differ):
         RolloutActor("franka", str(dataset.folder))
     with (
         pytest.raises(UserError, match=rf"cannot start: ValueError: the machine {differ}"),
-        _pool(dataset, SETTINGS, 1) as pool,
+        rollout_pool(dataset, SETTINGS, 1) as pool,
     ):
         list(pool.run([Shard(0, 8)]))
     assert sorted(path.name for path in dataset.folder.iterdir()) == [WRITING, MANIFEST]
@@ -263,3 +263,20 @@ def test_an_mlflow_store_that_fails_meanwhile_does_not_end_the_collection(tracki
         recorder.record(tally)
         assert tracker.client.get_run(run.id).data.metrics["episodes"] == 8
     assert capsys.readouterr().err.count("the collection goes on") == 1
+
+
+def test_two_drivers_on_one_dataset_lose_and_double_nothing(ray_session, tracking_settings, tmp_path):
+    """And what a living process is writing meanwhile stays."""
+    folder = tmp_path / "dataset"
+    unfinished = folder / WRITING / f"{Shard(96, 104).name}.{writer()}"
+    unfinished.parent.mkdir(parents=True)
+    unfinished.write_bytes(b"half")
+    with ThreadPoolExecutor(2) as threads:
+        drivers = [threads.submit(collected, folder, 40, ray_session, tracking_settings) for _ in range(2)]
+        datasets = [driver.result() for driver in drivers]
+    assert datasets[0] == datasets[1]
+    assert datasets[0].missing(40) == []
+    assert not [problem for _, problems in verify(datasets[0]) for problem in problems]
+    assert list(inventory(datasets[0])) == []
+    assert datasets[0].fingerprint() == alone(tmp_path / "alone", 40).fingerprint()
+    assert list(unfinished.parent.iterdir()) == [unfinished]

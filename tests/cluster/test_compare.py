@@ -262,8 +262,9 @@ def test_the_hidden_physics_belong_to_the_run_and_to_the_gap():
         def f(gap: str, run: int) -> float:
             return evaluation(setup, environment, gap, run)(x).f
 
-        found = [f(gap, run) for gap in ("paper", "training", "wide") for run in (1000, 1001)]
-        assert len(set(found)) == 6
+        gaps = ("object1_mass=1.9:2.1", "paper", "training", "wide")
+        found = [f(gap, run) for gap in gaps for run in (1000, 1001)]
+        assert len(set(found)) == 8
         assert f("wide", 1001) == found[-1]
 
 
@@ -271,6 +272,15 @@ def test_a_comparison_runs_under_the_gap_it_was_asked_for(compared, tmp_path):
     paper, wide = (table(compared("random", gap=gap, folder=tmp_path / gap)) for gap in ("paper", "wide"))
     assert [row["x"] for row in paper] == [row["x"] for row in wide]
     assert all(one["f"] != other["f"] for one, other in zip(paper, wide, strict=True))
+
+
+def test_an_explicit_gap_is_recorded_by_its_ranges_however_they_are_written(compared):
+    out = compared("random", gap="object2_mass=2,object1_friction=0.2:0.40", runs=1)
+    level = "object1_friction=0.2:0.4,object2_mass=2.0:2.0"
+    assert {row["gap"] for row in table(out)} == {level}
+    assert compared("random", gap=level, runs=1) == out
+    with pytest.raises(UserError, match="holds a comparison with gap"):
+        compared("random", gap="object2_mass=2.1", runs=1)
 
 
 def test_the_model_belongs_to_a_comparison_from_the_first_method_that_needs_one(compared, tmp_path):
@@ -290,6 +300,10 @@ def test_unknown_names_are_refused_with_the_nearest(compared):
         compared("svae-cd")
     with pytest.raises(UsageError, match="did you mean 'paper'"):
         compared(gap="papre")
+    with pytest.raises(UsageError, match="did you mean 'object1_mass'"):
+        compared(gap="object1_mas=2")
+    with pytest.raises(UsageError, match=r"object1_mass must satisfy 0 <= low <= high, got \[3.0, 2.0\]"):
+        compared(gap="object1_mass=3:2")
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,26 @@ with connect(RaySettings(temporary_folder=sys.argv[2]), sys.argv[1]):
 """
 
 
+CHATTER = """
+import sys, time
+from pathlib import Path
+import ray
+from cluster.config import RaySettings
+from cluster.session import connect
+class Talker:
+    def talk(self, megabytes):
+        for number in range(10_000 * megabytes):
+            print(f"{number:099d}")
+with connect(RaySettings(num_cpus=1, log_file_bytes=500_000), None):
+    logs = Path(ray._private.worker._global_node.get_logs_dir_path())
+    talker = ray.remote(Talker).remote()
+    ray.get(talker.talk.remote(5))
+    ray.get(talker.__ray_ready__.remote())
+    print("logs", sum(path.stat().st_size for path in logs.rglob("*") if path.is_file()))
+    print("out", max(path.stat().st_size for path in logs.glob("worker-*.out*")))
+"""
+
+
 def join(head, address, **environment) -> str:
     """What a new process prints when it joins, with the given variables and no others about Ray."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
@@ -140,3 +160,13 @@ def test_preflight_on_a_shared_cluster_advises_to_wait():
 
 def test_preflight_passes_when_exactly_enough_is_there():
     assert Session("10.0.0.1:6379", is_local=False, cpus=2).preflight(2) is None
+
+
+@pytest.mark.slow
+def test_the_logs_of_a_talkative_worker_stay_bounded():
+    """It prints five megabytes, of which two files of half a megabyte may remain."""
+    command = [sys.executable, "-c", CHATTER]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=180, check=True).stdout.split()
+    sizes = dict(zip(found[::2], map(int, found[1::2]), strict=True))
+    assert 100_000 < sizes["out"] <= 600_000
+    assert sizes["logs"] < 3_000_000

@@ -36,6 +36,8 @@ def job(franka_dataset, tmp_path) -> TrainingJob:
             "preset": "compact",
             "stride": 5,
             "seed": 0,
+            "balance": "none",
+            "changes": {},
         },
         preset="compact",
         updates=40,

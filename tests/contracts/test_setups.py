@@ -2,27 +2,37 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
 from workers import setups
+from workers.environments.environment import Observed
 from workers.gymnasium_environment import SetupEnvironment
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
 from workers.rollout import Episode, random_episode, rollout
+from workers.tasks.stop import STOPPED, never
 
+EXAMPLE = str(Path(__file__).parents[2] / "examples" / "two_link_pusher")
 SHORT = 300  # control steps; whole episodes run in the slow tests
 
 
-@pytest.fixture(scope="module", params=sorted(setups.MODULES))
+@pytest.fixture(scope="module", params=[*sorted(setups.MODULES), "two_link_pusher"])
 def whole(request):
-    return setups.load(request.param)
+    """A setup that ships, or the example of a user's own, found as a user's would be."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE)
+        patch.setenv("PYTHONPATH", f"{EXAMPLE}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+        yield setups.load(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +83,22 @@ def test_trajectories_have_the_channels_and_the_horizon_of_the_setup(setup, epis
         assert episode.x.shape == (setup.dimensions,)
         assert episode.x.dtype == np.float32
         assert episode.bad.shape == (setup.horizon,)
-        assert episode.stop == ""
+        assert episode.stop == "" or setup.stop is not never
+
+
+def test_only_stand_ins_for_hardware_end_early(setup):
+    assert (setup.stop is never) or setup.name.endswith("-rehearsal")
+    assert (setup.stop is never) == (STOPPED not in setup.conditions)
+
+
+def test_an_episode_is_stopped_from_the_step_of_its_reason_to_its_end(setup, episodes):
+    for episode in (each for each in episodes if each.stop):
+        stopped = np.flatnonzero(episode.bad >> setup.conditions.index(STOPPED) & 1)
+        assert stopped.tolist() == list(range(stopped[0], setup.horizon))
+        assert np.all(episode.bad[stopped[1:]] == episode.bad[-1])
+        assert np.all(episode.xi[:, stopped] == episode.xi[:, -1:])
+    for episode in (each for each in episodes if not each.stop and STOPPED in setup.conditions):
+        assert not np.any(episode.bad >> setup.conditions.index(STOPPED) & 1)
 
 
 def test_trajectories_stay_within_the_bounds_of_their_channels(setup, episodes):
@@ -100,20 +125,63 @@ def test_objectives_lie_within_their_limits_and_are_exact_in_float32(setup, epis
         assert episode.f == float(np.float32(episode.f))
 
 
+def test_a_push_or_walk_the_wanted_way_is_worth_more_than_the_other_way(setup, episodes):
+    """Franka pushes towards −y, the others towards +y; everything else stays as it was in the first step."""
+    y = [row for row, channel in enumerate(setup.observation) if channel.name in ("object1_y", "body_y")]
+    sign = -1.0 if setup.name.startswith("franka") else 1.0
+    with setup.open() as scene:
+        scene.reset(episodes[0].physics)
+        seen = scene.observed([scene.record()])
+        worth = [
+            setup.task.objective(_moved(seen, y, sign * 0.1 * way), np.zeros((8, 1), bool))
+            for way in (-1, 0, 1)
+        ]
+    scale = 10.0 if setup.name.startswith("daisy") else 1.0
+    assert np.diff(worth) == pytest.approx([0.1 * scale] * 2, abs=1e-5)
+
+
+def _moved(observed: Observed, rows: list[int], metres: float) -> Observed:
+    xi = observed.xi.copy()
+    xi[rows] += np.float32(metres)
+    return Observed(xi, observed.signals)
+
+
+def test_nothing_touches_but_what_stands_on_the_ground_at_the_start(setup, episodes):
+    """No condition is bad before the first command, and objects that nobody touches stay where they are."""
+    with setup.open() as scene:
+        scene.reset(episodes[0].physics)
+        seen = scene.observed([scene.record()])
+    assert not setup.task.is_bad(seen).any()
+    assert setup.stop(seen) == ""
+
+
+def test_angles_are_bounded_as_radians_are(setup):
+    """A joint turns less than twice around; in degrees its bounds would be tens to hundreds."""
+    for channel in (*setup.observation, *setup.controller.parameters):
+        if channel.unit == "rad":
+            assert max(abs(channel.low), abs(channel.high)) < 4 * np.pi, channel.name
+
+
 def test_different_controllers_move_differently(episodes):
     assert len({_bytes(episode) for episode in episodes}) == len(episodes)
 
 
-def test_every_physics_parameter_changes_the_trajectory(setup, environment, episodes):
-    """Over a few controllers, since one need not touch every object."""
+REVEALING = {"yumi": (0, 19), "yumi-rehearsal": (0, 429), "two_link_pusher": (4,)}
+"""Controllers that hit what they should: only a blow to both rolls of the YuMi shows restitution."""
+
+
+def test_every_physics_parameter_changes_the_trajectory(setup, whole, environment):
     nominal = _nominal(setup)
-    controllers = [episode.x for episode in episodes]
-    unchanged = [rollout(setup, environment, x, nominal).xi for x in controllers]
+    run = partial(rollout, whole if whole.name in REVEALING else setup, environment)
+    controllers = [
+        generator(0, "controller", index).random(setup.dimensions, dtype=np.float32)
+        for index in REVEALING.get(setup.name, (0,))
+    ]
+    unchanged = [run(x, nominal).xi for x in controllers]
     for name, value in nominal.items():
         varied = nominal | {name: value * 1.05}
         differs = (
-            not np.array_equal(rollout(setup, environment, x, varied).xi, xi)
-            for x, xi in zip(controllers, unchanged, strict=True)
+            not np.array_equal(run(x, varied).xi, xi) for x, xi in zip(controllers, unchanged, strict=True)
         )
         assert any(differs), f"{name} changes nothing"
 
@@ -122,9 +190,9 @@ def test_physics_with_an_unknown_or_missing_parameter_is_refused(setup, environm
     x = np.full(setup.dimensions, 0.5)
     with pytest.raises(ValueError, match="gravity"):
         rollout(setup, environment, x, _nominal(setup) | {"gravity": 9.81})
-    name, *_ = _nominal(setup)
-    with pytest.raises(ValueError, match=name):
-        rollout(setup, environment, x, {k: v for k, v in _nominal(setup).items() if k != name})
+    for name in _nominal(setup):
+        with pytest.raises(ValueError, match=name):
+            rollout(setup, environment, x, {k: v for k, v in _nominal(setup).items() if k != name})
 
 
 @pytest.mark.parametrize(
@@ -201,14 +269,24 @@ def test_gymnasium_steps_reproduce_a_rollout_bit_for_bit(setup):
     with setup.open() as environment:
         expected = rollout(setup, environment, x, info["physics"])
         commands = _commands(setup, environment, x, info["physics"])
-    seen = [adapter.step(command) for command in commands]
+    run = _steps_run(setup, expected)
+    seen = [adapter.step(command) for command in commands[:run]]
     adapter.close()
-    assert np.array_equal(np.stack([observation for observation, *_ in seen], axis=1), expected.xi)
-    assert [info["bad"] for *_, info in seen] == (expected.bad != 0).tolist()
-    assert [reward for _, reward, *_ in seen[:-1]] == [0.0] * (setup.horizon - 1)
-    assert seen[-1][1] == pytest.approx(expected.f, abs=1e-6)
-    ends = [truncated for *_, truncated, _ in seen]
-    assert ends == [False] * (setup.horizon - 1) + [True]
+    observations, rewards, terminated, truncated, infos = zip(*seen, strict=True)
+    assert np.array_equal(np.stack(observations, axis=1), expected.xi[:, :run])
+    assert [info["bad"] for info in infos] == (expected.bad[:run] != 0).tolist()
+    assert rewards[:-1] == (0.0,) * (run - 1)
+    assert np.float32(rewards[-1]) == expected.f
+    assert (terminated[-1], truncated[-1]) == (bool(expected.stop), not expected.stop)
+    assert not any((*terminated[:-1], *truncated[:-1]))
+    assert infos[-1].get("stop", "") == expected.stop
+
+
+def _steps_run(setup, episode: Episode) -> int:
+    """Steps up to the end of the episode, or to its stop."""
+    if not episode.stop:
+        return setup.horizon
+    return 1 + int(np.flatnonzero(episode.bad >> setup.conditions.index(STOPPED) & 1)[0])
 
 
 def _commands(setup, environment, x, physics) -> list[np.ndarray]:

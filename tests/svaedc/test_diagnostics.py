@@ -60,6 +60,39 @@ def test_the_bound_is_the_sum_of_its_reported_terms(model, halves):
     metrics = evaluate(model, halves[1])
     terms = metrics["log_p_xi"] + metrics["log_p_y"] - metrics["kl"]
     assert metrics["elbo"] == pytest.approx(terms)
+    four = ("log_p_xi", "log_p_y", "log_p_latent", "minus_log_q")
+    assert metrics["elbo"] == pytest.approx(sum(metrics[name] for name in four))
+
+
+def test_the_latent_terms_are_the_means_of_their_samples(model, halves):
+    held_out = halves[1]
+    batch = held_out.gather(np.arange(len(held_out)), torch.device("cpu"))
+    torch.manual_seed(0)
+    with torch.no_grad():
+        q, p = model.eval().posterior(batch.xi, batch.bad, batch.y), model.prior(batch.x)
+        draws = [q.rsample() for _ in range(2_000)]
+        sampled = {
+            "log_p_latent": torch.stack([p.log_prob(draw) for draw in draws]).mean(),
+            "minus_log_q": -torch.stack([q.log_prob(draw) for draw in draws]).mean(),
+        }
+    metrics = evaluate(model, held_out)
+    for name, expected in sampled.items():
+        assert metrics[name] == pytest.approx(expected.item(), rel=0.02), name
+
+
+def test_the_error_of_y_and_the_spread_of_latents_are_those_of_plain_loops(model, halves):
+    held_out = halves[1]
+    batch = held_out.gather(np.arange(len(held_out)), torch.device("cpu"))
+    with torch.no_grad():
+        tau, y = model.eval().latent_means(batch.x)
+        q = model.posterior(batch.xi, batch.bad, batch.y)
+    metrics = evaluate(model, held_out)
+    assert metrics["mae_y_gen"] == pytest.approx(np.abs(y.numpy() - batch.y.numpy()).mean(), rel=1e-4)
+    for d in range(9):
+        noise = np.random.default_rng(d).laplace(size=(400, len(held_out)))
+        aggregate = np.std(q.loc[:, d].numpy() + q.scale[:, d].numpy() * noise)
+        spread = np.std(tau[:, d].numpy()) / aggregate
+        assert metrics[f"latent_spread/{d:02d}"] == pytest.approx(spread, rel=0.05)
 
 
 def test_evaluation_repeats_and_leaves_mode_and_generator_alone(model, halves):

@@ -75,6 +75,12 @@ def test_kl_is_never_negative_and_zero_only_between_equals(family, loc_q, log_sc
     assert kl_divergence(q, q).item() == pytest.approx(0.0, abs=1e-12)
 
 
+@families
+def test_entropy_is_torchs_summed_over_the_event(family):
+    q, _ = random_pair(family)
+    torch.testing.assert_close(q.entropy(), TORCH[family](q.loc, q.scale).entropy().sum((1, 2)))
+
+
 def test_kl_between_families_is_refused():
     q, p = one("laplace", 0.0, 1.0), one("gaussian", 0.0, 1.0)
     with pytest.raises(TypeError, match="DiagonalLaplace, DiagonalGaussian"):

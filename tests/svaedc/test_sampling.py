@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc.sampling import ALONE, Shard, batches
+from svaedc.sampling import ALONE, STRATA, Balanced, Shard, batches
 
 SEED = (0, 0)
 
@@ -52,6 +52,38 @@ def test_a_dataset_smaller_than_a_batch_is_one_batch():
 def test_fewer_episodes_than_workers_are_refused():
     with pytest.raises(ValueError, match="3 workers need at least as many training episodes, got 2"):
         next(batches(2, 32, Shard(0, 3), SEED, range(1)))
+
+
+@given(
+    st.lists(st.floats(0.0, 1.0, width=32), min_size=1, max_size=300),
+    st.integers(0, 2**31),
+)
+def test_balanced_passes_show_every_stratum_equally_often_and_none_of_its_episodes_much_more(values, seed):
+    values = np.array(values, np.float32)
+    order = Balanced(values)(len(values), np.random.default_rng(seed))
+    assert len(order) == len(values)
+    edges = np.linspace(values.min(), values.max(), STRATA + 1)[1:-1]
+    strata = np.digitize(values, edges)
+    shown = [np.sum(strata[order] == each) for each in np.unique(strata)]
+    assert max(shown) - min(shown) <= 1
+    for each in np.unique(strata):
+        times = np.bincount(order, minlength=len(values))[strata == each]
+        assert times.max() - times.min() <= 1
+
+
+def test_batches_take_the_order_they_are_given_the_same_whatever_the_start():
+    order = Balanced(np.linspace(0.0, 1.0, 97, dtype=np.float32) ** 8)
+    whole = list(batches(97, 16, ALONE, SEED, range(20), order))
+    part = list(batches(97, 16, ALONE, SEED, range(7, 20), order))
+    for expected, found in zip(whole[7:], part, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    seen = np.concatenate(whole)
+    assert np.mean(seen > 90) > 2.0 * np.mean(np.arange(97) > 90)
+
+
+def test_values_that_are_not_finite_have_no_stratum():
+    with pytest.raises(ValueError, match="finite values, got NaN"):
+        Balanced(np.array([0.0, np.nan], np.float32))
 
 
 def test_a_rank_outside_the_world_is_refused():

@@ -9,9 +9,10 @@ from torch import nn
 
 from svaedc.diagnostics import collapse, evaluate
 from svaedc.model import initialised
-from svaedc.sampling import Shard
+from svaedc.sampling import Balanced, Shard
 from svaedc.settings import StageSettings, TrainingSettings, Weighting
 from svaedc.training import EpochReport, fit
+from svaedc.workplace import Workplace
 
 JOINT = StageSettings(
     updates=25,
@@ -102,7 +103,7 @@ def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves
     assert metrics["elbo"] > untrained["elbo"] + 10.0
     assert metrics["gen_norm"] < 0.9
     assert collapse(metrics) is None
-    assert last.metrics["held_out/best_kl"] == pytest.approx(metrics["kl"], rel=0.5)
+    assert last.metrics["held_out/best_loss"] == pytest.approx(metrics["kl"], rel=0.5)
 
 
 def test_the_second_stage_changes_only_the_prior_and_never_worsens_its_held_out_kl(model, halves):
@@ -111,6 +112,83 @@ def test_the_second_stage_changes_only_the_prior_and_never_worsens_its_held_out_
     changed = {name.split(".")[0] for name in final if not torch.equal(joint[name], final[name])}
     assert changed <= {"prior_network"}
     assert reports[-1].metrics["held_out/kl"] <= reports[2].metrics["held_out/kl"] + 1e-4
+
+
+def test_the_same_seed_gives_the_same_curve_and_another_seed_another(small_config, halves, bounds):
+    curves = []
+    for seed in (3, 3, 4):
+        model = initialised(small_config, halves[0], bounds, seed)
+        curves.append([r.metrics for r in trained(model, halves, replace(SHORT, seed=seed))])
+    assert curves[0] == curves[1]
+    assert curves[0] != curves[2]
+
+
+IMPATIENT = replace(
+    SHORT,
+    joint=replace(JOINT, updates=100, learning_rate=1e-9, patience=2.0),
+    prior=replace(JOINT, updates=0),
+)
+
+
+def test_a_stage_that_no_longer_gets_better_stops_early_and_puts_its_best_epoch_back(model, halves):
+    """So small a rate learns nothing; the rounding of each update decides which epoch is best."""
+    reports = trained(model, halves, replace(IMPATIENT, held_out_sample=60))
+    losses = [
+        -(r.metrics["held_out/log_p_xi"] + r.metrics["held_out/log_p_y"] - r.metrics["held_out/kl"]) / 200
+        for r in reports
+    ]
+    assert 3 <= len(reports) < 10
+    assert reports[-1].is_last
+    assert reports[-1].metrics["held_out/best_loss"] == pytest.approx(min(losses), rel=1e-6)
+    assert losses[-1] == pytest.approx(min(losses), rel=1e-6)
+
+
+def test_a_run_that_stopped_early_resumes_to_its_next_stage(small_config, halves, bounds):
+    settings = replace(IMPATIENT, prior=replace(JOINT, updates=20))
+    whole = initialised(small_config, halves[0], bounds, seed=0)
+    reports = trained(whole, halves, settings)
+    last_joint = [r for r in reports if r.stage == "joint"][-1]
+    assert last_joint.update == 100
+    resumed = initialised(small_config, halves[0], bounds, seed=9)
+    assert {r.stage for r in trained(resumed, halves, settings, resume=last_joint.state)} == {"prior"}
+    assert same(whole, resumed)
+
+
+def test_all_ranks_stop_when_rank_zero_would(model, halves):
+    reports = trained(model, halves, IMPATIENT, workplace=Workplace(agree=lambda _: True))
+    assert [r.update for r in reports] == [100]
+
+
+def test_bfloat16_learns_what_float32_learns(small_config, halves, bounds):
+    measured = {}
+    for precision in ("float32", "bfloat16"):
+        model = initialised(small_config, halves[0], bounds, seed=0)
+        settings = replace(SHORT.with_updates(joint=60, prior=0), epoch_updates=60)
+        trained(model, halves, settings, workplace=Workplace(precision=precision))
+        assert {value.dtype for value in model.parameters()} == {torch.float32}
+        measured[precision] = evaluate(model, halves[1])
+    assert measured["bfloat16"] != measured["float32"]
+    assert measured["bfloat16"]["rec_norm"] == pytest.approx(measured["float32"]["rec_norm"], abs=0.05)
+
+
+def test_densities_are_float32_though_networks_compute_in_bfloat16(model, batch):
+    with Workplace(precision="bfloat16").autocast(torch.device("cpu")):
+        terms = model(*batch)
+    assert [term.dtype for term in terms] == [torch.float32] * 3
+
+
+def test_an_unknown_precision_is_refused():
+    with pytest.raises(ValueError, match="one of float32, bfloat16, got 'float16'"):
+        Workplace(precision="float16")
+
+
+def test_balanced_sampling_trains_on_the_rare_episodes_too(small_config, halves, bounds):
+    training, _ = halves
+    y = np.asarray(training.y[training.rows])
+    models = [initialised(small_config, training, bounds, seed=0) for _ in range(2)]
+    trained(models[0], halves)
+    trained(models[1], halves, order=Balanced(y))
+    assert not same(*models)
 
 
 def test_a_stage_without_updates_is_left_out(model, halves):
@@ -134,7 +212,7 @@ def test_every_stage_is_wrapped_and_all_that_is_wrapped_gets_gradients(model, ha
         wrapped.append(module)
         return module
 
-    trained(model, halves, parallelise=record)
+    trained(model, halves, workplace=Workplace(parallelise=record))
     assert len(wrapped) == 2
     for module in wrapped:
         assert all(value.grad is not None for value in module.parameters())
@@ -143,7 +221,7 @@ def test_every_stage_is_wrapped_and_all_that_is_wrapped_gets_gradients(model, ha
 def test_workers_of_different_rank_draw_different_noise(small_config, halves, bounds):
     models = [initialised(small_config, halves[0], bounds, seed=0) for _ in range(2)]
     for rank, each in enumerate(models):
-        next(fit(each, *halves, SHORT, shard=Shard(rank, 2)))
+        next(fit(each, *halves, SHORT, workplace=Workplace(Shard(rank, 2))))
     assert not same(*models)
 
 

@@ -3,6 +3,8 @@
 import signal
 import subprocess
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,8 @@ from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.verification import verify
+from workers.environments.franka import MODEL
+from workers.environments.tabletop import Tabletop
 from workers.rollout import random_episode
 
 COLLECT = """
@@ -37,6 +41,21 @@ for shard in dataset.missing(12):
     collect_shard(setup, dataset, shard)
 """
 UNLIMITED = 1 << 40
+
+
+class _Exploding(Tabletop):
+    """The Franka scene, whose arm is flung away in the third episode."""
+
+    def __init__(self, model):
+        super().__init__(model)
+        self.episodes = 0
+
+    def reset(self, physics):
+        super().reset(physics)
+        self.episodes += 1
+
+    def step(self, command):
+        return super().step([float("nan")] * len(command) if self.episodes == 3 else command)
 
 
 def _new(folder: Path) -> Dataset:
@@ -89,9 +108,22 @@ def test_the_report_sums_up_the_shard(tmp_path):
     assert report.shard == Shard(0, 3)
     assert report.badness == pytest.approx(columns.y.mean(), abs=1e-6)
     assert report.best == columns.f.max()
-    assert report.diverged == 0
+    assert (report.diverged, report.stopped) == (0, 0)
     assert report.size == dataset.path(Shard(0, 3)).stat().st_size
     assert report.rollout_seconds > report.storage_seconds >= 0.0
+
+
+def test_the_report_tells_stopped_episodes_from_diverged_ones(tmp_path):
+    """Of a setup that stops every episode in its first step; the third has exploded by then."""
+    setup = replace(
+        setups.load("franka"), build=partial(_Exploding, MODEL), stop=lambda _: "at once", horizon=9
+    )
+    dataset = create(tmp_path / "dataset", identity_of(setup, seed=3, episodes_per_shard=4))
+    report = collect_shard(setup, dataset, Shard(0, 4))
+    assert dataset.read(Shard(0, 4)).stop == ("at once", "at once", "diverged", "at once")
+    assert (report.diverged, report.stopped) == (1, 3)
+    assert dataset.sane_episodes() == 3
+    assert [found for _, found in verify(dataset)] == [[]]
 
 
 def test_two_processes_collecting_the_same_shards_write_what_one_writes(tmp_path, whole):

@@ -87,6 +87,30 @@ def test_the_motion_begins_at_the_hand_so_that_the_first_command_is_gentle(setup
     assert np.abs(first - scene.arm.gravity_torque()[:7]).max() < 20.0
 
 
+def test_the_middle_of_the_wanted_orientations_is_that_of_the_palm_facing_down(setup):
+    """In rad about x, y and z; degrees taken for them would point anywhere."""
+    middle = setup.controller.values(np.full(48, 0.5, dtype=np.float32))[3:6]
+    down = Rotation.from_euler("xyz", middle).apply((0.0, 0.0, 1.0))
+    assert down == pytest.approx((0.0, 0.0, -1.0), abs=1e-6)
+
+
+def test_the_hand_turns_towards_the_wanted_orientation(setup, scene):
+    """Of two controllers that differ in the yaw they want, each ends nearer to its own."""
+    ends = {}
+    for yaw in (0.0, 1.0):
+        scene.reset(franka.MODEL.nominal_physics())
+        x = np.full((6, 8), 0.5, dtype=np.float32)
+        x[:, 5] = yaw
+        command = setup.controller.start(x.ravel(), scene, setup.horizon)
+        for step in range(250):
+            scene.step(command(step))
+        wanted = Rotation.from_euler("xyz", setup.controller.values(x.ravel())[3:6])
+        ends[yaw] = wanted, Rotation.from_quat(scene.arm.state.orientation)
+    for yaw, (wanted, reached) in ends.items():
+        other = ends[1.0 - yaw][1]
+        assert (wanted * reached.inv()).magnitude() < (wanted * other.inv()).magnitude() - 0.02
+
+
 def test_parameters_run_from_their_low_to_their_high_end(setup):
     low, high = (setup.controller.values(np.full(48, end, dtype=np.float32)) for end in (0.0, 1.0))
     assert low == pytest.approx([parameter.low for parameter in setup.controller.parameters])

@@ -29,11 +29,23 @@ def x(franka):
     return generator(0, "controller", 0).random(franka.dimensions)
 
 
-def test_a_robot_is_found_by_name_and_names_its_setup(tmp_path):
-    robot = robots.find(FRANKA)
+@pytest.mark.parametrize("setup", ["franka", "yumi", "daisy-11d"])
+def test_a_robot_is_found_by_name_and_names_its_setup(setup, tmp_path):
+    robot = robots.find(f"{setup}-rehearsal")
     driver = robot.connect(0, 0.0, tmp_path)
     assert isinstance(driver, RobotDriver)
-    assert (driver.name, driver.setup) == (robot.name, robot.setup) == (FRANKA, "franka")
+    assert (driver.name, driver.setup) == (robot.name, robot.setup) == (f"{setup}-rehearsal", setup)
+
+
+@pytest.mark.parametrize("name", sorted(robots.ROBOTS))
+def test_a_robot_moves_as_the_setup_of_its_own_name(name, tmp_path):
+    setup = setups.load(name)
+    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    with setup.open() as environment:
+        episode = rollout(setup, environment, x, setup.gap("wide").draw(generator(3, "hidden-physics", 0)))
+    measured = robots.find(name).connect(3, 0.0, tmp_path).run("a", x)
+    assert (measured.f, measured.y, measured.stop) == (episode.f, episode.y, episode.stop)
+    assert measured.evidence == hashlib.sha256(episode.xi.tobytes()).hexdigest()
 
 
 def test_an_unknown_robot_is_refused_with_the_nearest_name():

@@ -47,6 +47,17 @@ def test_without_them_the_arm_falls(rested):
     assert rested.arm.state.position[2] < start - 0.02
 
 
+HALF = np.pi / 2
+# Denavit and Hartenberg in Craig's form: each joint's origin in m in the one before, and its roll in rad.
+FRAMES = (
+    ((0.0, 0.0, 0.333), 0.0),
+    ((0.0, 0.0, 0.0), -HALF),
+    ((0.0, -0.316, 0.0), HALF),
+    ((0.0825, 0.0, 0.0), HALF),
+    ((-0.0825, 0.384, 0.0), -HALF),
+    ((0.0, 0.0, 0.0), HALF),
+    ((0.088, 0.0, 0.0), HALF),
+)
 ONE_JOINT = [(joint, sign) for joint in range(7) for sign in (-1.0, 1.0) if (joint, sign) != (1, -1.0)]
 
 
@@ -69,6 +80,25 @@ def test_a_torque_on_one_joint_turns_that_joint_its_way(rested, joint, sign):
 def test_a_joint_at_its_limit_does_not_pass_it(rested):
     """The second joint starts at its lower limit of 0."""
     assert abs(_push(rested, 1, -5.0)[1]) < 1e-4
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_a_joint_turns_the_hand_about_its_own_axis(rested, joint):
+    """The hand's pose against the chain of the manufacturer's frames, with one joint turned by 0.2 rad."""
+    turned = np.array(franka.ARM.home)
+    turned[joint] += 0.2
+    client, body = rested.arm._client, rested.arm.body
+    for index, angle in zip(rested.arm._joints, turned, strict=True):
+        pybullet.resetJointState(body, index, angle, physicsClientId=client)
+    state = rested.arm.refresh()
+    origin, rotation = np.zeros(3), Rotation.identity()
+    for (place, roll), angle in zip(FRAMES, turned, strict=True):
+        origin = origin + rotation.apply(place)
+        rotation = rotation * Rotation.from_euler("x", roll) * Rotation.from_euler("z", angle)
+    flange = origin + rotation.apply((0.0, 0.0, 0.107))
+    assert state.position == pytest.approx(flange, abs=1e-4)
+    hand = rotation * Rotation.from_euler("z", -np.pi / 4)
+    assert (hand * Rotation.from_quat(state.orientation).inv()).magnitude() < 1e-3
 
 
 def test_hand_velocities_are_the_jacobian_times_the_joint_speeds(rested):
@@ -164,6 +194,17 @@ def test_a_robot_description_that_is_not_there_is_named():
         pytest.raises(FileNotFoundError, match="such"),
     ):
         Arm(world, model)
+
+
+@pytest.mark.parametrize("text", ["", "no robot", "<robot name='a'><link name='b'>", "<sdf/>"])
+def test_a_robot_description_that_does_not_load_is_named(tmp_path, text):
+    path = tmp_path / "broken.urdf"
+    path.write_text(text)
+    with (
+        World(time_step=0.002, solver_iterations=10) as world,
+        pytest.raises(ValueError, match=r"broken\.urdf does not load as a URDF"),
+    ):
+        Arm(world, replace(franka.ARM, urdf=str(path)))
 
 
 def test_a_home_pose_outside_the_limits_is_refused():

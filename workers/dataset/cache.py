@@ -14,7 +14,8 @@ from jaxtyping import Float32, Int64
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
-from workers.dataset.schema import Columns
+from workers.dataset.schema import Columns, degree
+from workers.rollout import DIVERGED
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
@@ -24,14 +25,16 @@ Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
 
 @dataclass(frozen=True)
 class TrainingCache:
-    """Memory-mapped arrays of N episodes and S = T // stride samples; diverged episodes are left out.
+    """Memory-mapped arrays of N episodes and S = T // stride samples.
+
+    Diverged episodes are left out; those that a stop rule ended are not.
 
     Attributes:
         repeats: consecutive episodes that share a controller.
         episode: indices.
         x: controllers in [0,1]^D.
         xi: trajectories in the units of the setup's channels, the last step of every stride.
-        bad: 1 where a bad condition held at the sampled step, else 0.
+        bad: 1 where a bad condition held at the sampled step, else 0; the degree of a graded G_bad.
         y: badness over all T steps.
         f: objective.
     """
@@ -157,13 +160,13 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
 
 
 def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
-    sane = np.array([stop == "" for stop in columns.stop])
+    sane = np.array([stop != DIVERGED for stop in columns.stop])
     last = slice(stride - 1, samples * stride, stride)
     return {
         "episode": columns.episode[sane],
         "x": columns.x[sane],
         "xi": columns.xi[sane][:, :, last],
-        "bad": (columns.bad[sane][:, last] != 0).astype(np.float32),
+        "bad": degree(columns.bad[sane][:, last]),
         "y": columns.y[sane],
         "f": columns.f[sane],
     }
@@ -171,7 +174,7 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
 
 def _require_finite(rows: Mapping[str, np.ndarray], path: Path) -> None:
     """Refuse what would turn the model's every weight into NaN many updates later."""
-    for name in ("x", "xi", "y", "f"):
+    for name in ("x", "xi", "bad", "y", "f"):
         strange = ~np.isfinite(rows[name]).reshape(len(rows[name]), -1).all(axis=1)
         if strange.any():
             raise ValueError(

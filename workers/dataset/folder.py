@@ -12,6 +12,7 @@ from workers.dataset.identity import Identity
 from workers.dataset.publication import link, synchronise, temporary_file
 from workers.dataset.schema import Columns, read, read_stops
 from workers.dataset.shards import Shard
+from workers.rollout import DIVERGED
 
 MANIFEST = "dataset.json"
 
@@ -48,8 +49,9 @@ class Dataset:
         return sum(shard.episodes for shard in self.shards())
 
     def sane_episodes(self) -> int:
-        """How many of them ran to their end; the rest diverged."""
-        return sum(read_stops(self.path(shard)).count("") for shard in self.shards())
+        """How many of them a model may learn from: all but the diverged ones."""
+        diverged = sum(read_stops(self.path(shard)).count(DIVERGED) for shard in self.shards())
+        return self.episodes() - diverged
 
     def size(self) -> int:
         """Bytes of the finished shards."""
@@ -86,7 +88,7 @@ def create(folder: Path, identity: Identity) -> Dataset:
     manifest = folder / MANIFEST
     if not manifest.exists():
         with temporary_file(folder, MANIFEST) as temporary:
-            temporary.write_text(json.dumps(json.loads(identity.to_json()), indent=2) + "\n")
+            temporary.write_text(manifest_text(identity))
             synchronise(temporary)
             link(temporary, manifest)
     dataset = open_dataset(folder)
@@ -98,6 +100,11 @@ def create(folder: Path, identity: Identity) -> Dataset:
             + ". Choose another folder, or ask for the same"
         )
     return dataset
+
+
+def manifest_text(identity: Identity) -> str:
+    """The content of `dataset.json`."""
+    return json.dumps(json.loads(identity.to_json()), indent=2) + "\n"
 
 
 def open_dataset(folder: Path) -> Dataset:

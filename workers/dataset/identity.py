@@ -11,6 +11,7 @@ from workers.rollout import VERSION as ROLLOUT_VERSION
 from workers.setups import Setup
 
 SCHEMA_VERSION = 1
+STORAGES = ("float32", "int16")
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class Identity:
         pybullet: version.
         numpy: version.
         repeats: R, episodes of each controller, under different physics each.
+        bad_kind: `bits`, one per condition and step, or `graded`, a degree per step.
+        bad_name: `module:function` of a user's G_bad; "" for the setup's own.
+        bad_digest: SHA-256 of the file that defines it.
+        setup_digest: SHA-256 of the file of a user's setup; "" for those that ship.
+        storage: how ξ is stored: `float32`, or `int16` codes between the bounds of its channels.
     """
 
     setup: str
@@ -51,9 +57,16 @@ class Identity:
     pybullet: str
     numpy: str
     repeats: int = 1
+    bad_kind: str = "bits"
+    bad_name: str = ""
+    bad_digest: str = ""
+    setup_digest: str = ""
+    storage: str = "float32"
 
     def __post_init__(self) -> None:
-        """Refuse shards without episodes, and controllers without them."""
+        """Refuse shards without episodes, controllers without them, and unknown storages."""
+        if self.storage not in STORAGES:
+            raise ValueError(f"storage must be one of {', '.join(STORAGES)}, got {self.storage!r}")
         for name in ("episodes_per_shard", "repeats"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -96,7 +109,9 @@ class Identity:
         )
 
 
-def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1) -> Identity:
+def identity_of(
+    setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1, storage: str = "float32"
+) -> Identity:
     """The identity of a dataset collected now, with this code and these libraries."""
     return Identity(
         setup=setup.name,
@@ -113,6 +128,11 @@ def identity_of(setup: Setup, *, seed: int, episodes_per_shard: int, repeats: in
         pybullet=version("pybullet"),
         numpy=version("numpy"),
         repeats=repeats,
+        bad_kind="graded" if setup.task.graded else "bits",
+        bad_name=setup.task.bad_name,
+        bad_digest=setup.task.bad_digest,
+        setup_digest=setup.code,
+        storage=storage,
     )
 
 

@@ -44,7 +44,12 @@ def synchronise(path: Path) -> None:
 
 def writer() -> str:
     """The suffix of this process's temporary files: host, boot and process id."""
-    return f"{_host()}.{_boot()}.{os.getpid()}"
+    return f"{host()}.{_boot()}.{os.getpid()}"
+
+
+def host() -> str:
+    """This machine's name, as it stands in the names of unfinished files."""
+    return socket.gethostname().replace(".", "_")
 
 
 def is_dead(name: str) -> bool:
@@ -53,7 +58,7 @@ def is_dead(name: str) -> bool:
     False for writers on other machines and for names without a writer: nobody here can tell.
     """
     match = _WRITER.fullmatch(name)
-    if match is None or match["host"] != _host():
+    if match is None or match["host"] != host():
         return False
     return match["boot"] != _boot() or not _alive(int(match["pid"]))
 
@@ -66,7 +71,7 @@ def wait_for_end(writers: Iterable[str], seconds: float) -> None:
         seconds: the longest wait.
     """
     deadline = time.monotonic() + seconds
-    own = [name for name in writers if name.startswith(f"{_host()}.")]
+    own = [name for name in writers if name.startswith(f"{host()}.")]
     while time.monotonic() < deadline and not all(is_dead(name) for name in own):
         time.sleep(0.02)
 
@@ -79,10 +84,6 @@ def _alive(pid: int) -> bool:
     except PermissionError:
         return True
     return True
-
-
-def _host() -> str:
-    return socket.gethostname().replace(".", "_")
 
 
 def _boot() -> str:

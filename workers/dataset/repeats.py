@@ -8,6 +8,7 @@ from jaxtyping import Float32, Float64, Int64
 
 from workers.dataset.folder import Dataset
 from workers.dataset.schema import read_outcomes
+from workers.rollout import DIVERGED
 
 TRAJECTORIES = 1_000
 """At most so many episodes are read for the share of ξ."""
@@ -92,8 +93,8 @@ def _others(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
 def _whole(
     episode: Sequence[int], stop: Sequence[str], repeats: int
 ) -> Int64[np.ndarray, "controllers repeats"]:
-    """Rows, in ascending episodes, of the controllers of which every repeat is there and ran to its end."""
-    sane = np.flatnonzero([reason == "" for reason in stop])
+    """Rows, in ascending episodes, of the controllers of which every repeat is there and none diverged."""
+    sane = np.flatnonzero([reason != DIVERGED for reason in stop])
     numbers = np.asarray(episode, dtype=np.int64)[sane] // repeats
     _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
     return sane[first[counts == repeats][:, None] + np.arange(repeats)]

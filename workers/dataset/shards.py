@@ -88,6 +88,11 @@ def digest_path(folder: Path, shard: Shard) -> Path:
     return folder / f"{shard.name}.sha256"
 
 
+def digest_line(shard: Shard, digest: str) -> str:
+    """The content of that file."""
+    return f"{digest}  {shard.name}\n"
+
+
 def recorded_digest(folder: Path, shard: Shard) -> str:
     """The SHA-256 written beside a shard; "" when there is none."""
     path = digest_path(folder, shard)
@@ -117,7 +122,7 @@ def _publish_digest(folder: Path, shard: Shard, digest: str) -> None:
     """Before the shard itself, so that no shard is without one; a shard already there keeps its own."""
     target = digest_path(folder, shard)
     with temporary_file(folder, target.name) as temporary:
-        temporary.write_text(f"{digest}  {shard.name}\n")
+        temporary.write_text(digest_line(shard, digest))
         synchronise(temporary)
         if not (folder / shard.name).exists():
             temporary.replace(target)

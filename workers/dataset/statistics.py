@@ -1,5 +1,6 @@
 """What the episodes of a dataset are like: objective, badness, and how often each condition is bad."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -7,7 +8,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
-from workers.dataset.schema import read_outcomes
+from workers.dataset.schema import Bad, read_outcomes
+from workers.rollout import DIVERGED
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """The quantiles that describe the objective."""
@@ -20,14 +22,16 @@ class Statistics:
     Attributes:
         objective: quantiles of f at `MARKS`.
         badness: mean y, in [0, 1].
-        bad_steps: the share of steps in which each condition was bad, by its name.
+        bad_steps: the share of steps in which each condition was bad, or the mean degree, by its name.
         diverged: how many episodes diverged.
+        stopped: how many episodes a stop rule ended, by its reason, in the order of the alphabet.
     """
 
     objective: Float64[np.ndarray, " marks"]
     badness: float
     bad_steps: Mapping[str, float]
     diverged: int
+    stopped: Mapping[str, int]
 
 
 def statistics(dataset: Dataset) -> Statistics:
@@ -36,15 +40,14 @@ def statistics(dataset: Dataset) -> Statistics:
     Raises:
         ValueError: the dataset has no episodes, or a damaged file.
     """
-    objectives, badness, diverged, steps = [], 0.0, 0, 0
+    objectives, badness, steps, stops = [], 0.0, 0, Counter[str]()
     bad = np.zeros(len(dataset.identity.conditions))
-    bits = np.arange(len(dataset.identity.conditions), dtype=np.uint8)
     for shard in dataset.shards():
         outcomes = read_outcomes(dataset.path(shard), dataset.identity)
         objectives.append(outcomes.f)
         badness += float(outcomes.y.sum(dtype=np.float64))
-        diverged += sum(stop != "" for stop in outcomes.stop)
-        bad += (outcomes.bad[..., None] >> bits & 1).sum(axis=(0, 1))
+        stops.update(outcomes.stop)
+        bad += _total(outcomes.bad, len(bad))
         steps += outcomes.bad.size
     if not objectives:
         raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
@@ -53,5 +56,13 @@ def statistics(dataset: Dataset) -> Statistics:
         objective=np.quantile(f, MARKS),
         badness=badness / len(f),
         bad_steps=dict(zip(dataset.identity.conditions, (bad / steps).tolist(), strict=True)),
-        diverged=diverged,
+        diverged=stops[DIVERGED],
+        stopped={reason: stops[reason] for reason in sorted(stops.keys() - {"", DIVERGED})},
     )
+
+
+def _total(bad: Bad, conditions: int) -> Float64[np.ndarray, " conditions"]:
+    """Bad steps of every condition; of a graded G_bad, the sum of its degrees."""
+    if bad.dtype == np.float32:
+        return np.array([bad.sum(dtype=np.float64)])
+    return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).sum(axis=(0, 1), dtype=np.float64)

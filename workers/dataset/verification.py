@@ -9,10 +9,12 @@ import numpy as np
 from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
-from workers.dataset.schema import Columns, read_identity
+from workers.dataset.schema import Columns, degree, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
+from workers.rollout import DIVERGED
+from workers.tasks.stop import STOPPED
 
 
 @dataclass(frozen=True)
@@ -28,13 +30,27 @@ def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Problem]]]:
 
     Episodes between shards that nobody has collected yet are no fault of a file: see `gaps`.
     """
-    reached = 0
+    doubled = overlaps(dataset)
     for shard in dataset.shards():
-        found = chain(
-            _overlap_problems(shard, reached), _byte_problems(dataset, shard), _row_problems(dataset, shard)
-        )
-        yield shard, [Problem(shard.name, what) for what in found]
+        beside = [problem for problem in doubled if problem.file == shard.name]
+        yield shard, beside + file_problems(dataset, shard)
+
+
+def overlaps(dataset: Dataset) -> list[Problem]:
+    """The shards that hold episodes once more; each may be whole in itself."""
+    found, reached = [], 0
+    for shard in dataset.shards():
+        if shard.start < reached:
+            what = f"it overlaps: episodes below {reached} are in files before it"
+            found.append(Problem(shard.name, what))
         reached = max(reached, shard.stop)
+    return found
+
+
+def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
+    """What is wrong with a shard in itself, whatever lies beside it."""
+    found = chain(_byte_problems(dataset, shard), _row_problems(dataset, shard))
+    return [Problem(shard.name, what) for what in found]
 
 
 def gaps(dataset: Dataset) -> Iterator[Shard]:
@@ -46,17 +62,16 @@ def gaps(dataset: Dataset) -> Iterator[Shard]:
         reached = max(reached, shard.stop)
 
 
-def _overlap_problems(shard: Shard, reached: int) -> Iterator[str]:
-    if shard.start < reached:
-        yield f"it overlaps: episodes below {reached} are in files before it"
-
-
 def _byte_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
+    digest_path = shards.digest_path(dataset.folder, shard)
     recorded = shards.recorded_digest(dataset.folder, shard)
     if not recorded:
         yield "its .sha256 file is missing"
-    elif shards.sha256(dataset.path(shard)) != recorded:
+        return
+    if shards.sha256(dataset.path(shard)) != recorded:
         yield "its bytes differ from its .sha256 file"
+    elif digest_path.read_text(errors="replace") != shards.digest_line(shard, recorded):
+        yield "its .sha256 file is not as `sha256sum` writes it"
 
 
 def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
@@ -75,11 +90,32 @@ def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
         yield f"its rows are not the episodes {shard.start} to {shard.stop - 1}"
 
 
+def _stop_problems(columns: Columns, identity: Identity) -> Iterator[str]:
+    """Diverged episodes are bad throughout, stopped ones from the step of the reason on, others never."""
+    reasons = np.array(columns.stop)
+    diverged = reasons == DIVERGED
+    if not np.all(columns.bad[diverged]):
+        yield "a diverged episode has steps that are not bad"
+    if identity.bad_kind == "graded":
+        if np.any(columns.bad[~diverged & (reasons != ""), -1] != 1.0):
+            yield "a stopped episode ends with a step that is not bad"
+        return
+    bit = 1 << identity.conditions.index(STOPPED) if STOPPED in identity.conditions else 0
+    stopped = (columns.bad[~diverged] & bit) != 0
+    if not np.array_equal(stopped[:, -1], reasons[~diverged] != ""):
+        yield f"its stop reasons do not fit the condition {STOPPED!r} of the last steps"
+    if np.any(stopped[:, :-1] > stopped[:, 1:]):
+        yield "an episode goes on after it was stopped"
+
+
 def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     if not all(np.isfinite(values).all() for values in (columns.x, columns.xi, columns.y, columns.f)):
         yield "it holds numbers that are not finite"
-    if not np.allclose(columns.y, (columns.bad != 0).mean(axis=1), atol=1e-6):
+    if not np.all((degree(columns.bad) >= 0.0) & (degree(columns.bad) <= 1.0)):
+        yield "it holds degrees of badness outside [0, 1]"
+    if not np.allclose(columns.y, degree(columns.bad).mean(axis=1, dtype=np.float64), atol=1e-6):
         yield "y is not the mean of the bad steps"
+    yield from _stop_problems(columns, identity)
     drawn = columns.episode // identity.repeats
     controllers = (generator(identity.seed, "controller", int(index)) for index in drawn)
     width = columns.x.shape[1]

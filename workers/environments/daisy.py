@@ -15,6 +15,7 @@ from workers.environments.environment import Channel, Environment, Observed
 from workers.environments.tabletop import first_two_axes
 from workers.physics import Physics
 from workers.simulation.hexapod import Hexapod, HexapodModel
+from workers.simulation.scenery import Camera, Ground, Machine, Scenery
 from workers.simulation.world import World
 
 SUBSTEPS = 4
@@ -24,6 +25,7 @@ BODY = len(JOINTS)  # index in ξ of the body's x
 HOME = tuple(angle for side in SIDES[:: len(KINDS)] for angle in (0.0, 0.0, -side * 1.57))  # rad
 UNLIMITED = (math.inf,) * len(KINDS)
 TRUE_SPEEDS = tuple(daisy_body.SPEED.values())
+WALKWAY = 0.5  # m to either side, as pictures show it
 NOMINAL = {"friction": 2.0, "restitution": 0.05, "link_damping": 0.1}  # the last in 1/s
 
 ROBOT = HexapodModel(
@@ -37,6 +39,12 @@ ROBOT = HexapodModel(
     speeds=UNLIMITED * len(LEGS),
     stiffness=0.1,
     damping=1.0,
+)
+
+SCENERY = Scenery(
+    bodies=(Machine(ROBOT.urdf, JOINTS, "body"),),
+    ground=Ground(0.5, (-WALKWAY, WALKWAY), (-math.inf, math.inf), numbered=(WALKWAY,)),
+    camera=Camera(target=(0.0, 0.0, 0.22), follows="body", distance=2.8, yaw=40.0, pitch=-32.0, angle=38.0),
 )
 
 
@@ -82,6 +90,7 @@ class Daisy(Environment):
     """Daisy on the plane z = 0, its motors aiming at the commanded joint angles."""
 
     control_step = CONTROL_STEP
+    scenery = SCENERY
 
     def __init__(self, model: DaisyModel) -> None:
         self.observation = observation()

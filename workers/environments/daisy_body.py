@@ -41,6 +41,9 @@ TUBE_ASIDE = 0.020  # m beside the actuator's output
 FOOT_MASS, FOOT_RADIUS = 0.060, 0.025  # radius assumed: tube and rubber
 HOUSING_RADIUS = 0.04  # m, of the sphere that stands for an actuator's body, assumed
 OUTPUT_HEIGHT = 0.045  # m, of an X8 above its mount
+PLATE, ACTUATOR, TUBE, RUBBER = "0.30 0.32 0.36", "0.80 0.16 0.14", "0.88 0.88 0.86", "0.12 0.12 0.13"
+"""Red, green and blue of the parts, in pictures."""
+FRONT_MARK = "0.12 0.04 0.004"  # m, of a plate on the chassis that is only seen
 
 
 class Solid(NamedTuple):
@@ -110,7 +113,10 @@ def _vector(numbers: np.ndarray) -> Vector:
 def urdf() -> str:
     """The robot's description; joints and links in the order of `JOINTS`."""
     box = f'<box size="{_numbers(CHASSIS_BOX)}"/>'
-    parts = [_link("body", body(), _collision((0.0, 0.0, 0.0), box))]
+    x, y, z = 0.0, 0.36 * CHASSIS_BOX[1], CHASSIS_BOX[2] / 2
+    plate = _shape((x, y, z), f'<box size="{FRONT_MARK}"/>')
+    mark = f"<visual>{plate}{_material(ACTUATOR)}</visual>"
+    parts = [_link("body", body(), _part((0.0, 0.0, 0.0), box, PLATE) + mark)]
     for leg in LEGS:
         parts += _leg(leg)
     return "\n".join(['<robot name="daisy">', *parts, "</robot>"])
@@ -120,17 +126,17 @@ def _leg(leg: str) -> list[str]:
     side, degrees, _ = LEGS[leg]
     mount = (*_mount(leg), MOUNT_PLANE + OUTPUT_HEIGHT)
     tube_end = (TUBE_LENGTH, -side * TUBE_ASIDE, 0.0)
-    housing = _collision((TUBE_LENGTH, 0.0, 0.0), _sphere(HOUSING_RADIUS))
+    housing = _part((TUBE_LENGTH, 0.0, 0.0), _sphere(HOUSING_RADIUS), ACTUATOR)
     return [
         _joint(leg, "base", "body", (mount, radians(degrees)), (0.0, 0.0, 1.0)),
-        _link(f"{leg}_coxa", _coxa(), _collision(COXA_CENTRE, _sphere(HOUSING_RADIUS))),
+        _link(f"{leg}_coxa", _coxa(), _part(COXA_CENTRE, _sphere(HOUSING_RADIUS), ACTUATOR)),
         _joint(leg, "shoulder", f"{leg}_coxa", ((0.0, side * 0.0225, 0.055), 0.0), (0.0, side, 0.0)),
-        _link(f"{leg}_femur", _femur(), _tube_collision(-side * TUBE_ASIDE) + housing),
+        _link(f"{leg}_femur", _femur(), _tube_part(-side * TUBE_ASIDE) + housing),
         _joint(leg, "elbow", f"{leg}_femur", ((TUBE_LENGTH, -side * 0.045, 0.0), 0.0), (0.0, -side, 0.0)),
         _link(
             f"{leg}_tibia",
             _tibia(side),
-            _tube_collision(-side * TUBE_ASIDE) + _collision(tube_end, _sphere(FOOT_RADIUS)),
+            _tube_part(-side * TUBE_ASIDE) + _part(tube_end, _sphere(FOOT_RADIUS), RUBBER),
         ),
     ]
 
@@ -149,24 +155,32 @@ def _joint(leg: str, kind: str, parent: str, origin: tuple[Vector, float], axis:
     )
 
 
-def _link(name: str, solid: Solid, collisions: str) -> str:
+def _link(name: str, solid: Solid, parts: str) -> str:
     xx, yy, zz = solid.inertia
     return (
         f'<link name="{name}"><inertial><origin xyz="{_numbers(solid.centre)}"/>'
         f'<mass value="{solid.mass:.12g}"/><inertia ixx="{xx:.12g}" iyy="{yy:.12g}" izz="{zz:.12g}"'
-        f' ixy="0" ixz="0" iyz="0"/></inertial>{collisions}</link>'
+        f' ixy="0" ixz="0" iyz="0"/></inertial>{parts}</link>'
     )
 
 
-def _tube_collision(aside: float) -> str:
+def _tube_part(aside: float) -> str:
     capsule = f'<capsule radius="{TUBE_RADIUS}" length="{TUBE_LENGTH}"/>'
-    return _collision((TUBE_LENGTH / 2, aside, 0.0), capsule, pitch=pi / 2)
+    return _part((TUBE_LENGTH / 2, aside, 0.0), capsule, TUBE, pitch=pi / 2)
 
 
-def _collision(place: Vector, shape: str, pitch: float = 0.0) -> str:
+def _part(place: Vector, shape: str, colour: str, pitch: float = 0.0) -> str:
     """The shape, to touch and to see."""
-    inside = f'<origin xyz="{_numbers(place)}" rpy="0 {pitch:.12g} 0"/><geometry>{shape}</geometry>'
-    return f"<visual>{inside}</visual><collision>{inside}</collision>"
+    inside = _shape(place, shape, pitch)
+    return f"<visual>{inside}{_material(colour)}</visual><collision>{inside}</collision>"
+
+
+def _shape(place: Vector, shape: str, pitch: float = 0.0) -> str:
+    return f'<origin xyz="{_numbers(place)}" rpy="0 {pitch:.12g} 0"/><geometry>{shape}</geometry>'
+
+
+def _material(colour: str) -> str:
+    return f'<material name="{colour}"><color rgba="{colour} 1"/></material>'
 
 
 def _sphere(radius: float) -> str:

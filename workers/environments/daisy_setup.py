@@ -9,6 +9,7 @@ from workers.physics import PhysicsRanges, around
 from workers.setups import Setup
 from workers.tasks.walk import Walk
 
+TASK = Walk(channel=BODY)
 SUCCESS = 15.0  # f of 1.5 m (section 6 of the paper) without a fast joint
 
 
@@ -27,7 +28,7 @@ def walking(
         name=name,
         build=partial(Daisy, model),
         controller=controller,
-        task=Walk(channel=BODY),
+        task=TASK,
         observation=observation(),
         horizon=horizon,
         control_step=CONTROL_STEP,

@@ -8,10 +8,10 @@ from functools import partial
 from math import pi
 
 from workers.controllers.end_effector import EndEffectorWaypoints, WaypointRanges
+from workers.environments.drive import TorqueDrive
 from workers.environments.tabletop import CylinderModel, Tabletop, TabletopModel
-from workers.physics import PhysicsRanges, around
 from workers.setups import Setup
-from workers.simulation.arm import ArmModel
+from workers.simulation.arm import UNLIMITED, ArmModel
 from workers.tasks.stable_push import StablePush
 
 HORIZON = 500  # control steps (section 7 of the paper: 500 at 500 Hz)
@@ -29,6 +29,8 @@ ARM = ArmModel(
     upper=(0.5, 1.7628, 0.5, -0.0698, 2.8973, 3.7525, 2.8973),
     home=(0.4239, 0.0, 0.4799, -2.727, 0.2047, 2.4689, 1.5125),
     joint_damping=1.0,
+    speed_limit=UNLIMITED,
+    base=(0.0, 0.0, 0.0),
     hand="panda_hand_joint",
     fingers=("panda_finger_joint1", "panda_finger_joint2"),
     finger_force=20.0,
@@ -37,10 +39,11 @@ TORQUE_LIMITS = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N·m, of the real 
 
 MODEL = TabletopModel(
     arm=ARM,
-    torque_limits=TORQUE_LIMITS,
+    drive=TorqueDrive(TORQUE_LIMITS),
     cylinders=tuple(CylinderModel(radius=0.08, height=0.22, start=start, nominal=ROLL) for start in STARTS),
     control_step=CONTROL_STEP,
     solver_iterations=10,
+    table=(TABLE_X, TABLE_Y),
 )
 
 WAYPOINTS = WaypointRanges(
@@ -53,11 +56,11 @@ WAYPOINTS = WaypointRanges(
 
 def setup() -> Setup:
     """The setup `franka`: 48-D, 500 steps of 2 ms, f in [-1.8, 1.2] m."""
-    nominal = MODEL.nominal_physics()
-    paper = {
-        name: interval for name, interval in around(nominal, 0.05).intervals.items() if "rolling" not in name
-    }
-    fixed = {name: (value, value) for name, value in nominal.items() if "rolling" in name}
+    return setup_of("franka", MODEL)
+
+
+def setup_of(name: str, model: TabletopModel) -> Setup:
+    """The same under another name and with another model of the scene."""
     task = StablePush(
         starts=STARTS,
         direction=-1.0,
@@ -67,21 +70,17 @@ def setup() -> Setup:
         channel=len(ARM.joints),
     )
     return Setup(
-        name="franka",
-        build=partial(Tabletop, MODEL),
+        name=name,
+        build=partial(Tabletop, model),
         controller=EndEffectorWaypoints(
             waypoints=6, ranges=WAYPOINTS, turning=(1.0, 0.1), torque_limits=TORQUE_LIMITS
         ),
         task=task,
-        observation=MODEL.observation(),
+        observation=model.observation(),
         horizon=HORIZON,
         control_step=CONTROL_STEP,
-        physics=around(nominal, 0.05),
-        gaps={
-            "paper": PhysicsRanges(paper | fixed),
-            "training": around(nominal, 0.05),
-            "wide": around(nominal, 0.2),
-        },
+        physics=model.gaps()["training"],
+        gaps=model.gaps(),
         objective_limits=task.objective_limits,
         success=SUCCESS,
     )

@@ -1,17 +1,21 @@
 """An arm in front of a table with tall cylinders on it: the scene of the stable push."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from struct import Struct
 
 import numpy as np
 from jaxtyping import Float
 
+from workers.environments.drive import Drive
 from workers.environments.environment import Channel, Environment, Observed
-from workers.physics import Physics
+from workers.physics import Physics, PhysicsRanges, around
 from workers.simulation.arm import Arm, ArmModel
 from workers.simulation.cylinder import Cylinder
+from workers.simulation.scenery import Camera, Ground, Interval, Machine, Roll, Scenery
 from workers.simulation.world import World
 
 
@@ -31,17 +35,19 @@ class TabletopModel:
 
     Attributes:
         arm: the robot.
-        torque_limits: N·m, of each moving joint; commands beyond them are clipped.
+        drive: what a command means, and its limits.
         cylinders: the objects to push.
         control_step: seconds, also the step of the simulation.
         solver_iterations: of the contact solver in each step.
+        table: extent along x and y of the task's part of the plane, in m; pictures show it.
     """
 
     arm: ArmModel
-    torque_limits: tuple[float, ...]
+    drive: Drive
     cylinders: tuple[CylinderModel, ...]
     control_step: float
     solver_iterations: int
+    table: tuple[Interval, Interval]
 
     def nominal_physics(self) -> dict[str, float]:
         """Nominal values of all randomised parameters: `object1_mass` (kg) and so on."""
@@ -49,6 +55,17 @@ class TabletopModel:
             f"object{number}_{name}": value
             for number, cylinder in enumerate(self.cylinders, 1)
             for name, value in cylinder.nominal.items()
+        }
+
+    def gaps(self) -> dict[str, PhysicsRanges]:
+        """Levels of the sim-to-real gap; `paper` varies all but the rolling friction."""
+        nominal = self.nominal_physics()
+        training = around(nominal, 0.05)
+        fixed = {name: (value, value) for name, value in nominal.items() if "rolling" in name}
+        return {
+            "paper": PhysicsRanges({**training.intervals, **fixed}),
+            "training": training,
+            "wide": around(nominal, 0.2),
         }
 
     def observation(self) -> tuple[Channel, ...]:
@@ -63,9 +80,27 @@ class TabletopModel:
         return (*joints, *objects)
 
     def action(self) -> tuple[Channel, ...]:
-        """Joint torques in N·m."""
-        limits = zip(self.arm.joints, self.torque_limits, strict=True)
-        return tuple(Channel(name, "N·m", -limit, limit) for name, limit in limits)
+        """One number per joint that moves."""
+        limits = zip(self.arm.joints, self.drive.limits, strict=True)
+        return tuple(Channel(name, self.drive.unit, -limit, limit) for name, limit in limits)
+
+    def scenery(self) -> Scenery:
+        """The arm, its objects and the table, from above the side that they are pushed to."""
+        arm = Machine(Path(self.arm.urdf), self.arm.joints, self.arm.base)
+        rolls = (Roll(c.radius, c.height, f"object{n}") for n, c in enumerate(self.cylinders, 1))
+        x, y = (float(mean) for mean in np.mean([c.start for c in self.cylinders], axis=0))
+        return Scenery(
+            bodies=(arm, *rolls),
+            ground=Ground(0.1, *self.table, numbered=()),
+            camera=Camera(
+                target=(x, 0.0, 0.27),
+                follows="",
+                distance=1.75,
+                yaw=90.0 - math.copysign(32.0, y),
+                pitch=-33.0,
+                angle=38.0,
+            ),
+        )
 
 
 def _object_channels(name: str) -> list[Channel]:
@@ -91,6 +126,7 @@ class Tabletop(Environment):
         self.observation = model.observation()
         self.action = model.action()
         self.control_step = model.control_step
+        self.scenery = model.scenery()
         self._model = model
         self._build()
 
@@ -98,6 +134,7 @@ class Tabletop(Environment):
         model = self._model
         self._world = World(time_step=model.control_step, solver_iterations=model.solver_iterations)
         self.arm = Arm(self._world, model.arm)
+        self._apply = model.drive.bind(self.arm)
         self._layout = Struct(f"{len(model.arm.joints) + 7 * len(model.cylinders) + 4}d")
         self._cylinders = [
             Cylinder(self._world, radius=c.radius, height=c.height, position=c.start) for c in model.cylinders
@@ -128,8 +165,8 @@ class Tabletop(Environment):
         )
 
     def step(self, command: Sequence[float]) -> Record:
-        """Apply joint torques for one control step."""
-        self.arm.apply_torque(command)
+        """Drive the joints for one control step."""
+        self._apply(command)
         self._world.step()
         return self.record()
 

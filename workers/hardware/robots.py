@@ -1,7 +1,7 @@
 """The robots known by name."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -26,14 +26,23 @@ class Robot:
 
 
 def _rehearsal(name: str, setup: str) -> Robot:
+    """The robot simulated by the setup of its own name, for models and methods that know only `setup`."""
+
     def connect(seed: int, pace: float, folder: Path) -> RobotDriver:
-        return RehearsalRobot(name, setups.load(setup), seed, pace, folder)
+        return RehearsalRobot(name, replace(setups.load(name), name=setup), seed, pace, folder)
 
     return Robot(name, setup, connect)
 
 
 ROBOTS: Mapping[str, Robot] = MappingProxyType(
-    {robot.name: robot for robot in (_rehearsal("franka-rehearsal", "franka"),)}
+    {
+        robot.name: robot
+        for robot in (
+            _rehearsal("franka-rehearsal", "franka"),
+            _rehearsal("yumi-rehearsal", "yumi"),
+            _rehearsal("daisy-11d-rehearsal", "daisy-11d"),
+        )
+    }
 )
 
 

@@ -1,4 +1,4 @@
-"""A torque-controlled arm bolted to the world: joints in, torques out, kinematics and dynamics on request."""
+"""An arm bolted to the world: torques or speeds in, joints out, kinematics and dynamics on request."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,10 +8,12 @@ from typing import NamedTuple
 import pybullet_data
 
 from workers.simulation.bullet import pybullet
+from workers.simulation.description import joint_indices, load_robot
 from workers.simulation.world import World
 
 Vector = tuple[float, ...]
 
+UNLIMITED = 100.0  # rad/s; Bullet's own limit of joint speeds, which nothing here reaches
 _ORIGIN = (0.0, 0.0, 0.0)
 _ANY_LINK, _NO_FLAGS = -2, 0
 _LINK, _DISTANCE = 3, 8  # in a contact point of PyBullet: the first body's link, and the gap in m
@@ -48,6 +50,9 @@ class ArmModel:
         upper: upper joint limits in rad.
         home: joint angles at reset in rad.
         joint_damping: N·m·s/rad at each moving joint.
+        speed_limit: rad/s that no joint passes; one number, for Bullet clips all joints of a body alike
+            (`changeDynamics` of another joint overwrites the first).
+        base: origin of the arm in the world, in m.
         hand: name of the joint that carries the link whose frame is the hand.
         fingers: names of the prismatic joints held shut, whose links touch nothing.
         finger_force: N that holds each of them.
@@ -59,6 +64,8 @@ class ArmModel:
     upper: tuple[float, ...]
     home: tuple[float, ...]
     joint_damping: float
+    speed_limit: float
+    base: tuple[float, float, float]
     hand: str
     fingers: tuple[str, ...]
     finger_force: float
@@ -81,11 +88,9 @@ class Arm:
         self._world = world
         self._client = world.client
         self._model = model
-        self.body = self._load(model.urdf)
-        index = self._joint_indices()
-        missing = [name for name in (*model.joints, model.hand, *model.fingers) if name not in index]
-        if missing:
-            raise ValueError(f"{model.urdf} has no joint {missing[0]!r}; it has {', '.join(index)}")
+        self.body = self._load(model)
+        needed = (*model.joints, model.hand, *model.fingers)
+        index = joint_indices(self.body, self._client, model.urdf, needed)
         self._joints = [index[name] for name in model.joints]
         self._fingers = [index[name] for name in model.fingers]
         self._hand = index[model.hand]
@@ -94,18 +99,11 @@ class Arm:
         self._configure()
         self.state = self._read()
 
-    def _load(self, urdf: str) -> int:
-        path = Path(pybullet_data.getDataPath()) / urdf
-        if not path.exists():
-            raise FileNotFoundError(f"no robot description at {path}")
+    def _load(self, model: ArmModel) -> int:
+        path = Path(pybullet_data.getDataPath()) / model.urdf
         # Nobody looks: the meshes that are only seen would take 100 MB.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
-        return pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=self._client)
-
-    def _joint_indices(self) -> dict[str, int]:
-        count = pybullet.getNumJoints(self.body, physicsClientId=self._client)
-        infos = (pybullet.getJointInfo(self.body, i, physicsClientId=self._client) for i in range(count))
-        return {info[1].decode(): info[0] for info in infos}
+        return load_robot(path, self._client, basePosition=model.base, useFixedBase=True, flags=flags)
 
     def _configure(self) -> None:
         model = self._model
@@ -118,6 +116,10 @@ class Arm:
                 jointDamping=model.joint_damping,
                 physicsClientId=self._client,
             )
+        # Together with joint limits in one call it would spoil the limits, and the arm explodes.
+        pybullet.changeDynamics(
+            self.body, self._joints[0], maxJointVelocity=model.speed_limit, physicsClientId=self._client
+        )
         self._world.make_intangible(self.body, self._fingers)
 
     def reset(self) -> None:
@@ -147,6 +149,17 @@ class Arm:
         """Set the joint torques, in N·m, of the next step."""
         pybullet.setJointMotorControlArray(
             self.body, self._joints, pybullet.TORQUE_CONTROL, forces=torque, physicsClientId=self._client
+        )
+
+    def apply_speed(self, speed: Sequence[float], force: Sequence[float]) -> None:
+        """Set the joint speeds, in rad/s, that motors of that force, in N·m, seek in the next step."""
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=speed,
+            forces=force,
+            physicsClientId=self._client,
         )
 
     def refresh(self) -> ArmState:

@@ -73,11 +73,16 @@ class Hexapod:
         self.drive = self._drive_freely if math.isinf(model.speeds[0]) else self._drive_slowly
 
     def _load(self, urdf: str) -> int:
-        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
         with NamedTemporaryFile("w", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()
-            return pybullet.loadURDF(file.name, flags=flags, physicsClientId=self._client)
+            try:
+                return pybullet.loadURDF(file.name, flags=flags, physicsClientId=self._client)
+            except pybullet.error as error:
+                raise ValueError(
+                    f"the robot's description must be a URDF that Bullet can load, got {urdf[:60]!r}: {error}"
+                ) from error
 
     def _joint_names(self) -> list[str]:
         count = pybullet.getNumJoints(self.body, physicsClientId=self._client)

@@ -1,5 +1,6 @@
 """A dataset whose episodes cost nothing: random numbers in the shape of a rollout's record."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,14 +38,15 @@ def episodes_of():
 
     def episode(identity, index: int) -> Episode:
         rng = generator(identity.seed, "toy", index)
-        bad = rng.integers(0, 4, identity.horizon).astype(np.uint8)
+        diverged = index % 7 == 3
+        bad = np.where(diverged, 3, rng.integers(0, 4, identity.horizon)).astype(np.uint8)
         return Episode(
             x=generator(identity.seed, "controller", index // identity.repeats).random(2, dtype=np.float32),
             xi=rng.uniform(-1, 1, (3, identity.horizon)).astype(np.float32),
             bad=bad,
             y=float((bad != 0).mean()),
             f=float(np.float32(rng.normal())),
-            stop="diverged" if index % 7 == 3 else "",
+            stop="diverged" if diverged else "",
             physics=PhysicsRanges(identity.physics).draw(generator(identity.seed, "physics", index)),
         )
 
@@ -66,6 +68,41 @@ def fill(episodes_of):
             )
 
     return commit_missing
+
+
+@pytest.fixture
+def stopped_of(episodes_of):
+    """(identity, indices) -> the same, but every fifth episode stops at its twelfth step as "too far"."""
+
+    def stopped(episode):
+        bad, xi = episode.bad.copy(), episode.xi.copy()
+        bad[11:] = 4
+        xi[:, 11:] = xi[:, 11:12]
+        return replace(episode, xi=xi, bad=bad, y=float((bad != 0).mean()), f=-2.0, stop="too far")
+
+    def episodes(identity, indices):
+        plain = zip(indices, episodes_of(identity, indices), strict=True)
+        return [stopped(each) if index % 5 == 1 else each for index, each in plain]
+
+    return episodes
+
+
+@pytest.fixture
+def guarded(tmp_path: Path, identity, stopped_of):
+    """Two shards of 8 episodes of a setup with a stop rule: 1, 6 and 11 stopped, 3 and 10 diverged."""
+    from workers.dataset import schema, shards
+    from workers.dataset.folder import create
+
+    created = create(tmp_path / "guarded", replace(identity, conditions=(*identity.conditions, "stopped")))
+    for shard in created.missing(16):
+        rows = stopped_of(created.identity, range(shard.start, shard.stop))
+        rows = [replace(row, bad=row.bad | 4) if row.stop == "diverged" else row for row in rows]
+        shards.commit(
+            created.folder,
+            shard,
+            lambda path, rows=rows, start=shard.start: schema.write(path, created.identity, start, rows),
+        )
+    return created
 
 
 @pytest.fixture

@@ -35,6 +35,16 @@ def test_diverged_episodes_are_left_out(dataset, tmp_path):
     assert not set(cache.episode.tolist()) & {3, 10, 17}
 
 
+def test_stopped_episodes_may_be_learnt_from_and_diverged_ones_may_not(guarded, tmp_path):
+    cache = training_cache(guarded, 5, tmp_path)
+    assert cache.episode.tolist() == [index for index in range(16) if index not in (3, 10)]
+    assert guarded.sane_episodes() == 14
+    stopped = np.isin(cache.episode, (1, 6, 11))
+    assert np.all(cache.bad[stopped][:, 2:] == 1.0)  # steps 14 and 19 of 20, stopped at 11
+    assert np.all(cache.xi[stopped][:, :, 2] == cache.xi[stopped][:, :, 3])
+    assert np.all(cache.f[stopped] == -2.0)
+
+
 def test_the_arrays_are_memory_mapped_and_read_only(dataset, tmp_path):
     cache = training_cache(dataset, 5, tmp_path)
     assert isinstance(cache.xi, np.memmap)

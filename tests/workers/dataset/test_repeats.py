@@ -121,6 +121,16 @@ def test_the_irreducible_part_of_a_dataset_counts_whole_controllers_only(repeate
     assert found.xi == pytest.approx(error_bounds(np.concatenate([part.xi for part in columns])[rows]))
 
 
+def test_stopped_repeats_are_facts_about_their_controller(tmp_path, identity, stopped_of):
+    """Of 10 controllers with two episodes, those of the diverged episodes 3, 10 and 17 lack one."""
+    dataset = create(
+        tmp_path / "dataset", replace(identity, repeats=2, conditions=(*identity.conditions, "stopped"))
+    )
+    rows = stopped_of(dataset.identity, range(20))
+    shards.commit(dataset.folder, Shard(0, 20), lambda path: schema.write(path, dataset.identity, 0, rows))
+    assert irreducible(dataset).controllers == 7
+
+
 def test_an_irreducible_part_needs_repeats_and_two_whole_controllers(dataset, tmp_path, identity, fill):
     with pytest.raises(ValueError, match="must hold repeats of its controllers, got repeats = 1"):
         irreducible(dataset)

@@ -19,7 +19,13 @@ def test_every_episode_counts_alike_in_a_dataset_with_a_partial_shard(dataset, i
         {"tipped": (bits & 1).astype(bool).mean(), "off_table": (bits & 2).astype(bool).mean()}
     )
     assert found.objective == pytest.approx(np.quantile([episode.f for episode in episodes], MARKS))
-    assert found.diverged == 3
+    assert (found.diverged, found.stopped) == (3, {})
+
+
+def test_stopped_episodes_are_counted_by_their_reason_and_not_as_diverged(guarded):
+    found = statistics(guarded)
+    assert (found.diverged, found.stopped) == (2, {"too far": 3})
+    assert found.bad_steps["stopped"] == pytest.approx((2 * 20 + 3 * 9) / (16 * 20))
 
 
 def test_a_lopsided_partial_shard_weighs_no_more_than_its_rows(tmp_path, identity, episodes_of):

@@ -124,6 +124,41 @@ def test_badness_that_is_not_the_mean_of_the_bad_steps_is_named(dataset, identit
     assert _problems(dataset) == {MIDDLE.name: "y is not the mean of the bad steps"}
 
 
+def test_a_whole_dataset_with_stopped_episodes_has_no_problems(guarded):
+    assert _problems(guarded) == {}
+
+
+@pytest.mark.parametrize(
+    ("index", "spoil", "what"),
+    [
+        (9, {"stop": "too far"}, "its stop reasons do not fit the condition 'stopped' of the last steps"),
+        (11, {"stop": ""}, "its stop reasons do not fit the condition 'stopped' of the last steps"),
+        (
+            10,
+            {"bad": np.array([0] + [7] * 19, dtype=np.uint8), "y": 0.95},
+            "diverged episode has steps that are not",
+        ),
+        (11, {"bad": np.array([4, 1] + [4] * 18, dtype=np.uint8), "y": 1.0}, "goes on after it was stopped"),
+    ],
+)
+def test_a_stop_that_does_not_fit_its_steps_is_named(guarded, stopped_of, index, spoil, what):
+    episodes = stopped_of(guarded.identity, range(8, 16))
+    episodes[2] = replace(episodes[2], bad=episodes[2].bad | 4)  # the diverged one
+    episodes[index - 8] = replace(episodes[index - 8], **spoil)
+    _rewrite(guarded, MIDDLE, guarded.identity, episodes)
+    found = _problems(guarded)
+    assert list(found) == [MIDDLE.name]
+    assert what in found[MIDDLE.name]
+    assert " | " not in found[MIDDLE.name]
+
+
+def test_a_stopped_episode_of_a_setup_without_a_stop_rule_is_named(dataset, identity, stopped_of):
+    _rewrite(dataset, MIDDLE, identity, stopped_of(identity, range(8, 16)))
+    assert _problems(dataset) == {
+        MIDDLE.name: "its stop reasons do not fit the condition 'stopped' of the last steps"
+    }
+
+
 def test_numbers_that_are_not_finite_are_named(dataset, identity, episodes_of):
     episodes = episodes_of(identity, range(8, 16))
     episodes[3].xi[1, 4] = np.nan

@@ -1,0 +1,46 @@
+"""`svaedc dataset export`: the episodes in other formats, whole or not at all."""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from cluster.errors import UsageError, UserError, nearest
+from cluster.progress import ProgressLine
+from workers.dataset.folder import Dataset
+from workers.dataset.lerobot_export import export_lerobot
+from workers.dataset.numpy_export import export_npz
+from workers.dataset.publication import writer
+from workers.dataset.shards import Shard
+
+FORMATS: Mapping[str, Callable[[Dataset, Path], Iterator[Shard]]] = {
+    "npz": export_npz,
+    "lerobot": export_lerobot,
+}
+
+
+def export(dataset: Dataset, form: str, out: Path) -> None:
+    """Write a dataset in another format; the folder appears when it is complete.
+
+    Raises:
+        UsageError: the format is unknown.
+        UserError: the folder exists already, or the dataset is empty, damaged or overlapping.
+    """
+    if form not in FORMATS:
+        raise UsageError(f"unknown format {form!r}, {nearest(form, FORMATS)}")
+    if out.exists():
+        raise UserError(f"{out} exists already; choose a new folder, an export never writes into one")
+    if not dataset.episodes():
+        raise UserError(f"{dataset.folder} holds no episodes yet; collect some first")
+    building = out.with_name(f"{out.name}.{writer()}")
+    building.mkdir(parents=True)
+    try:
+        with ProgressLine("episodes", dataset.episodes(), 0) as progress:
+            for shard in FORMATS[form](dataset, building):
+                progress.advance(shard.episodes, form)
+        building.rename(out)
+    except ValueError as error:
+        raise UserError(
+            f"{error}; `svaedc dataset verify {dataset.folder}` lists everything that is wrong"
+        ) from error
+    finally:
+        shutil.rmtree(building, ignore_errors=True)

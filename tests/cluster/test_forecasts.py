@@ -1,0 +1,121 @@
+"""`svaedc collect --plan`: a pilot that is part of the dataset, and an account of how far off it was."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cluster.collect import collect, foretell
+from cluster.config import CollectSettings
+from cluster.errors import UserError
+from cluster.forecasts import PLAN, begin, review, spent
+from cluster.tally import Tally
+from cluster.tracking import open_tracker
+from workers import setups
+from workers.dataset.folder import create, open_dataset
+from workers.dataset.identity import identity_of
+from workers.dataset.publication import WRITING
+from workers.forecast import Estimate, Forecast
+
+SETTINGS = CollectSettings(actors=2, episodes_per_shard=2)
+
+
+def job(folder: Path, episodes: int, session, tracker) -> dict:
+    return {
+        "setup": setups.load("franka"),
+        "episodes": episodes,
+        "folder": folder,
+        "seed": 0,
+        "settings": SETTINGS,
+        "session": session,
+        "tracker": tracker,
+    }
+
+
+@pytest.fixture
+def dataset(tmp_path):
+    """A dataset of no episodes."""
+    return create(tmp_path / "dataset", identity_of(setups.load("franka"), seed=0, episodes_per_shard=2))
+
+
+EXPECTED = Forecast(
+    episodes=100,
+    actors=2,
+    core_hours=Estimate(2.0, 0.1),
+    hours=Estimate(1.0, 0.1),
+    size=Estimate(1e6, 0.0),
+    badness=Estimate(0.5, 0.1),
+)
+
+
+def did(episodes: int, core_hours: float, bad: float = 0.5) -> Tally:
+    return Tally(
+        episodes=episodes,
+        rollout_seconds=3600 * core_hours,
+        size=12_000 * episodes,
+        bad=bad * episodes,
+    )
+
+
+def test_a_pilot_is_the_beginning_of_the_dataset_and_is_judged_at_its_end(
+    ray_session, tracking_settings, tmp_path, capsys
+):
+    folder, tracker = tmp_path / "dataset", open_tracker(tracking_settings)
+    foretell(**job(folder, 12, ray_session, tracker))
+    said = capsys.readouterr().err
+    assert "the whole job of 12 episodes on 2 actors, from its first 8" in said
+    assert all(f"  {name} " in said for name in ("core-hours", "wall time", "disk", "badness"))
+    pilot = {path: path.stat().st_ino for path in folder.glob("*.parquet")}
+    assert len(pilot) == 4
+    dataset = collect(**job(folder, 12, ray_session, tracker))
+    assert dataset.episodes() == 12
+    assert all(path.stat().st_ino == number for path, number in pilot.items())
+    said = capsys.readouterr().err
+    assert "against the plan, 12 of 12 episodes accounted for: core_hours " in said
+    plan = json.loads((folder / PLAN).read_text())
+    assert plan["off"].keys() == {"core_hours", "hours", "bytes", "badness"}
+    assert sum(entry["size"] for entry in plan["spent"]) == dataset.size()
+    runs = tracker.client.search_runs([tracker.experiment])
+    assert any("plan/core_hours_off" in run.data.metrics for run in runs)
+    assert list((folder / WRITING).iterdir()) == []
+
+
+def test_the_plan_is_no_part_of_the_dataset(dataset):
+    before = dataset.fingerprint()
+    begin(dataset, 100, EXPECTED, did(10, 0.2))
+    assert open_dataset(dataset.folder) == dataset
+    assert dataset.fingerprint() == before
+
+
+def test_how_far_off_a_plan_was_is_its_account_against_it(dataset):
+    """Twenty episodes of a killed command are missing in the account: they count on neither side."""
+    begin(dataset, 0, EXPECTED, did(20, 0.4))
+    spent(dataset, did(60, 1.4, bad=0.6), 2)
+    off = review(dataset)
+    assert off["plan/core_hours_off"] == pytest.approx(1.8 / 1.6 - 1)
+    assert off["plan/bytes_off"] == pytest.approx(80 * 12_000 / 8e5 - 1)
+    assert off["plan/badness_off"] == pytest.approx((20 * 0.5 + 60 * 0.6) / 80 / 0.5 - 1)
+
+
+def test_a_plan_is_judged_once_and_not_before_its_end(dataset):
+    begin(dataset, 2, EXPECTED, did(20, 0.4))
+    assert review(dataset) == {}
+    begin(dataset, 0, EXPECTED, did(20, 0.4))
+    assert review(dataset)
+    kept = (dataset.folder / PLAN).read_text()
+    spent(dataset, did(60, 1.4), 2)
+    assert review(dataset) == {}
+    assert (dataset.folder / PLAN).read_text() == kept
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"expected": {}}', '{"expected": 1, "spent": [1]}'])
+def test_a_plan_that_nobody_can_read_changes_nothing(dataset, content):
+    (dataset.folder / PLAN).write_text(content)
+    spent(dataset, did(60, 1.4), 2)
+    assert review(dataset) == {}
+    assert (dataset.folder / PLAN).read_text() == content
+
+
+def test_too_little_to_plan_for_is_refused(ray_session, tracking_settings, tmp_path):
+    with pytest.raises(UserError, match=r"2 episodes are left to collect in .*: too few to plan for"):
+        foretell(**job(tmp_path / "dataset", 2, ray_session, open_tracker(tracking_settings)))

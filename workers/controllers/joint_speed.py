@@ -1,0 +1,90 @@
+"""Joint-speed waypoints, the other 48-D controller of section 7 of the paper."""
+
+from collections.abc import Sequence
+from itertools import chain
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+from workers.controllers.controller import Command, Controller
+from workers.controllers.reference import minimum_jerk
+from workers.environments.environment import Channel
+from workers.environments.tabletop import Tabletop
+
+SHARE = (0.1, 1.0)
+"""Range of a waypoint's duration, in shares of their sum; not from 0, for a speed cannot change at once."""
+
+
+class JointSpeedWaypoints(Controller):
+    """Smooth changes from one joint speed to the next, each within its own share of the episode.
+
+    From rest, v(s) = v_n + (v_{n+1} − v_n)(10 s³ − 15 s⁴ + 6 s⁵), s running from 0 to 1 during the share of
+    waypoint n + 1. No command leaves the speed limits, whatever x; and a joint beyond one of its angle limits
+    is commanded only inwards.
+
+    Args:
+        waypoints: how many speeds are attained.
+        joints: names of the joints.
+        speed_limits: rad/s of each joint.
+        lower: lowest angle of each joint, in rad, at which it is still driven downwards.
+        upper: highest angle of each joint, in rad, at which it is still driven upwards.
+    """
+
+    def __init__(
+        self,
+        *,
+        waypoints: int,
+        joints: tuple[str, ...],
+        speed_limits: tuple[float, ...],
+        lower: tuple[float, ...],
+        upper: tuple[float, ...],
+    ) -> None:
+        self._waypoints = waypoints
+        self._limits = np.array(speed_limits)
+        self._lower = lower
+        self._upper = upper
+        speeds = [(joint, limit) for joint, limit in zip(joints, speed_limits, strict=True)]
+        self.parameters = tuple(chain.from_iterable(_channels(n, speeds) for n in range(1, waypoints + 1)))
+
+    def start(self, x: Float32[np.ndarray, " d"], environment: Tabletop, horizon: int) -> Command:
+        """Plan all speeds; the command of a step reads the joints at that step."""
+        plan = self.plan(x, horizon)
+        arm = environment.arm
+        lower, upper = self._lower, self._upper
+
+        def command(step: int) -> Sequence[float]:
+            return _inwards(plan[step].tolist(), arm.state.joints, lower, upper)
+
+        return command
+
+    def plan(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "time joints"]:
+        """Speeds, in rad/s, wanted at the end of every step."""
+        points = self.values(x).reshape(self._waypoints, -1)
+        speeds = np.vstack([np.zeros(len(self._limits)), points[:, :-1]])
+        ends = horizon * np.cumsum(points[:, -1]) / points[:, -1].sum()
+        starts = np.concatenate([[0.0], ends[:-1]])
+        step = np.arange(1, horizon + 1)
+        leg = np.searchsorted(ends[:-1], step)
+        duration = (ends - starts)[leg, None]
+        s = (step[:, None] - starts[leg, None]) / duration
+        wanted, _, _ = minimum_jerk(s, speeds[leg], speeds[leg + 1], duration)
+        return np.clip(wanted, -self._limits, self._limits)  # rounding
+
+
+def _inwards(
+    speeds: Sequence[float], angles: Sequence[float], lower: Sequence[float], upper: Sequence[float]
+) -> list[float]:
+    """The speeds, but 0 for every one that would lead a joint further beyond its limit."""
+    return [
+        0.0 if (speed > 0.0 and angle >= high) or (speed < 0.0 and angle <= low) else speed
+        for speed, angle, low, high in zip(speeds, angles, lower, upper, strict=True)
+    ]
+
+
+def _channels(waypoint: int, speeds: Sequence[tuple[str, float]]) -> list[Channel]:
+    """The parameters of a waypoint: a speed for every joint, then its duration."""
+    prefix = f"waypoint{waypoint}"
+    return [
+        *(Channel(f"{prefix}_{joint}", "rad/s", -limit, limit) for joint, limit in speeds),
+        Channel(f"{prefix}_duration", "1", *SHARE),
+    ]

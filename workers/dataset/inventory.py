@@ -1,0 +1,76 @@
+"""Whether a folder holds the files of its dataset and no others that could be taken for them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from workers.dataset.folder import MANIFEST, Dataset, manifest_text
+from workers.dataset.publication import WRITING
+from workers.dataset.shards import Shard, named, recorded_digest, sha256
+from workers.dataset.verification import Problem
+
+_DIGEST = ".sha256"
+
+
+def inventory(dataset: Dataset) -> Iterator[Problem]:
+    """What is wrong with the folder, beside what is in its shards; nothing is changed or deleted."""
+    yield from _manifest_problems(dataset)
+    for path in sorted(dataset.folder.glob("*.parquet")):
+        if not list(named(path.name)):
+            yield Problem(path.name, f"no shard has such a name, {_whose(dataset, path)}")
+    for shard in lost(dataset):
+        yield Problem(shard.name, "it is missing: only its .sha256 file is there")
+    for shard in left_over(dataset):
+        yield Problem(shard.name + _DIGEST, "it is left over: the episodes of its shard are in other files")
+
+
+def lost(dataset: Dataset) -> list[Shard]:
+    """Shards of which only the digest is there, and whose episodes are nowhere else.
+
+    They were deleted, or their writer was killed between the two names.
+    """
+    return [shard for shard in _digests_alone(dataset) if not _is_covered(dataset, shard)]
+
+
+def left_over(dataset: Dataset) -> list[Shard]:
+    """Shards of which only the digest is there, while other files hold their episodes."""
+    return [shard for shard in _digests_alone(dataset) if _is_covered(dataset, shard)]
+
+
+def sweep_digests(dataset: Dataset) -> int:
+    """Remove the digests that killed writers left over; returns how many.
+
+    The file of a writer that is about to finish the shard, on whatever machine, keeps its digest.
+    """
+    writing = [path.name for path in (dataset.folder / WRITING).glob("*")]
+    swept = 0
+    for shard in left_over(dataset):
+        if not any(name.startswith(f"{shard.name}.") for name in writing):
+            (dataset.folder / (shard.name + _DIGEST)).unlink(missing_ok=True)
+            swept += 1
+    return swept
+
+
+def _manifest_problems(dataset: Dataset) -> Iterator[Problem]:
+    if (dataset.folder / MANIFEST).read_text() != manifest_text(dataset.identity):
+        yield Problem(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
+
+
+def _whose(dataset: Dataset, path: Path) -> str:
+    """Whether a strange file is a copy; readers of all Parquet files would see its episodes as well."""
+    digest = sha256(path)
+    for shard in dataset.shards():
+        if recorded_digest(dataset.folder, shard) == digest:
+            return f"and its bytes are a copy of {shard.name}"
+    return "and its bytes are those of no shard here"
+
+
+def _digests_alone(dataset: Dataset) -> Iterator[Shard]:
+    for path in sorted(dataset.folder.glob(f"*.parquet{_DIGEST}")):
+        for shard in named(path.name.removesuffix(_DIGEST)):
+            if not dataset.path(shard).exists():
+                yield shard
+
+
+def _is_covered(dataset: Dataset, shard: Shard) -> bool:
+    missing = dataset.missing(shard.stop)
+    return not any(shard.start < other.stop and other.start < shard.stop for other in missing)

@@ -1,0 +1,67 @@
+"""Putting a recomputed shard in the place of a broken one: at once, and with the old bytes kept."""
+
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+
+from workers.dataset.publication import link, synchronise, temporary_file
+from workers.dataset.shards import Shard, digest_line, digest_path, sha256
+
+REPLACED = ".replaced"
+"""Folder, below the dataset, of what stood in a shard's place; readers of Parquet folders skip its name."""
+
+
+class Repair(Enum):
+    """What became of a shard that was written anew."""
+
+    ADDED = "was missing and has been added"
+    REPLACED = "has been replaced; what was there is kept in .replaced"
+    DIGEST = "was whole; its .sha256 file has been written anew"
+
+
+def replace(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Repair:
+    """Write a shard anew; its name holds the old bytes or the new ones at every moment, never others.
+
+    A file that holds the new bytes already is not touched.
+
+    Args:
+        folder: of the dataset.
+        shard: what is written.
+        write: writes the file at the path it is given.
+
+    Raises:
+        OSError: the disk is full or not writable; the old file is where it was.
+    """
+    target = folder / shard.name
+    with temporary_file(folder, shard.name) as temporary:
+        write(temporary)
+        synchronise(temporary)
+        digest = sha256(temporary)
+        is_there = target.exists()
+        if is_there and sha256(target) == digest:
+            _write_digest(folder, shard, digest)
+            return Repair.DIGEST
+        if is_there:
+            keep_aside(folder, target)
+        _write_digest(folder, shard, digest)
+        temporary.replace(target)
+        synchronise(folder)
+        return Repair.REPLACED if is_there else Repair.ADDED
+
+
+def keep_aside(folder: Path, path: Path) -> Path:
+    """Give a file a second name in `.replaced`, with the start of its SHA-256; equal bytes are kept once."""
+    aside = folder / REPLACED
+    aside.mkdir(exist_ok=True)
+    kept = aside / f"{path.name}.{sha256(path)[:12]}"
+    link(path, kept)
+    return kept
+
+
+def _write_digest(folder: Path, shard: Shard, digest: str) -> None:
+    target = digest_path(folder, shard)
+    with temporary_file(folder, target.name) as temporary:
+        temporary.write_text(digest_line(shard, digest))
+        synchronise(temporary)
+        temporary.replace(target)
+        synchronise(folder)
