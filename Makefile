@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-SOURCES := workers svaedc cluster tests $(wildcard benchmarks)
+SOURCES := workers svaedc cluster tests $(wildcard benchmarks examples)
 
 # Nothing here reports home.
 export RAY_USAGE_STATS_ENABLED := 0

@@ -24,6 +24,7 @@ from cluster.options import (
     settings_of,
     setup_of,
     usage_errors,
+    working,
 )
 from cluster.progress import say
 
@@ -86,6 +87,10 @@ def collect(
     repeats: Annotated[
         int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
     ] = 1,
+    bad: Annotated[
+        str,
+        typer.Option("--bad", metavar="MODULE:FUNCTION", help="G_bad of your own instead of the setup's."),
+    ] = "",
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -104,7 +109,7 @@ def collect(
     from cluster.collect import collect as run_collect
     from cluster.collect import foretell
 
-    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
     with _services(settings, address) as (session, tracker):
         (foretell if plan else run_collect)(
             setup=chosen,

@@ -110,6 +110,7 @@ def _parameters(
         "episodes": episodes,
         "seed": identity.seed,
         "repeats": identity.repeats,
+        "bad": identity.bad_name,
         "actors": actors,
         "identity": identity.digest[:12],
         **settings.model_dump(mode="json"),

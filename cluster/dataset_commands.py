@@ -14,6 +14,7 @@ from cluster.options import durable, interruptible
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.identity import Identity
 from workers.dataset.inventory import inventory
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
@@ -46,6 +47,7 @@ def info(folder: Folder) -> None:
         "observation": f"{len(identity.observation)} channels, stored as {identity.storage}",
         "controller": f"{len(identity.parameters)} parameters",
         "seed": str(identity.seed),
+        "G_bad": _g_bad(identity),
         "repeats": f"{identity.repeats} of each controller",
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
@@ -73,6 +75,11 @@ def _described(found: Statistics) -> dict[str, str]:
         "diverged": str(found.diverged),
         "stopped": ", ".join(f"{count} {reason}" for reason, count in found.stopped.items()) or "0",
     }
+
+
+def _g_bad(identity: Identity) -> str:
+    name = f"{identity.bad_name} ({identity.bad_digest[:12]})" if identity.bad_name else "the setup's own"
+    return f"{name}, {identity.bad_kind}"
 
 
 def _irreducible(dataset: Dataset) -> dict[str, str]:

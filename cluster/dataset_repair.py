@@ -59,7 +59,7 @@ def _broken(dataset: Dataset) -> list[Shard]:
 
 def _simulated(dataset: Dataset) -> Setup:
     """The dataset's setup, if it still rolls out the same episodes here."""
-    setup = setup_of(dataset.identity.setup)
+    setup = setup_of(dataset.identity.setup, dataset.identity.bad_name)
     try:
         require_same_code(setup, dataset)
     except ValueError as error:

@@ -103,6 +103,11 @@ def _require_same(dataset: Dataset, setup: Setup) -> None:
         raise UsageError(
             f"{dataset.folder} is of {identity.setup}, not of {setup.name}; use --setup {identity.setup}"
         )
+    if identity.bad_name:
+        raise UsageError(
+            f"{dataset.folder} was collected under the G_bad {identity.bad_name}, and a picture shows the "
+            "setup's own; give the controller itself to --x instead"
+        )
     channels = tuple(channel.name for channel in setup.observation)
     if (tuple(row[0] for row in identity.observation), identity.conditions) != (channels, setup.conditions):
         raise UserError(

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,10 +9,11 @@ from typing import Annotated
 import typer
 
 from cluster.config import Settings, load_settings
-from cluster.errors import UsageError
+from cluster.errors import UsageError, UserError
 from cluster.progress import say
 from workers import setups
 from workers.setups import Setup
+from workers.tasks.own_bad import with_bad
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -54,7 +56,9 @@ Address = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
-SetupName = Annotated[str, typer.Option("--setup", help="Robot, controller and task, such as franka.")]
+SetupName = Annotated[
+    str, typer.Option("--setup", help="Robot, controller and task, such as franka, or a module of your own.")
+]
 DatasetFolder = Annotated[Path, typer.Option("--dataset", help="Folder of the dataset.", callback=durable)]
 ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.", callback=durable)]
 TrainedModel = Annotated[
@@ -67,10 +71,29 @@ def settings_of(config: Path | None, overrides: list[str] | None) -> Settings:
     return load_settings(config, overrides or [])
 
 
-def setup_of(name: str) -> Setup:
-    """The setup of that name; an unknown one is a usage error."""
+def setup_of(name: str, bad: str = "") -> Setup:
+    """The setup of that name, with G_bad of that name unless it is ""; an unknown one is a usage error.
+
+    Users' modules are found in the working directory too, after everything that is installed.
+    """
+    sys.path.append(str(Path.cwd()))
     with usage_errors():
-        return setups.load(name)
+        return with_bad(setups.load(name), bad)
+
+
+def working(setup: Setup, seed: int) -> Setup:
+    """The setup, tried out if users supplied a part of it: before anything starts or claims a folder.
+
+    Raises:
+        UserError: it does not work.
+    """
+    from workers.collection import require_working
+
+    try:
+        require_working(setup, seed)
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    return setup
 
 
 @contextmanager

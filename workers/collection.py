@@ -12,7 +12,7 @@ from workers.dataset.identity import identity_of
 from workers.dataset.publication import host
 from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, Episode, random_episode
-from workers.setups import Setup
+from workers.setups import MODULES, Setup
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,18 @@ class ShardReport:
     storage_seconds: float
     seconds: float
     machine: str
+
+
+def require_working(setup: Setup, seed: int) -> None:
+    """Roll out one episode if users supplied the robot or G_bad: their mistakes are no fault of a shard.
+
+    Raises:
+        ValueError: something in their code is not as it must be.
+        OSError: a file of theirs is missing.
+    """
+    if setup.name not in MODULES or setup.task.bad_name:
+        with setup.open() as environment:
+            random_episode(setup, environment, seed, 0)
 
 
 def roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:

@@ -25,8 +25,8 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
 
     An episode that explodes is bad, ends with its last sane observation and has f's lower limit for a reward,
     as in a rollout. A stopped one is bad in its last step and has the task's objective of a stopped episode.
-    `info` holds `bad`, whether a bad condition holds, after `reset` the episode's `physics`, and when
-    terminated the reason as `stop`.
+    `info` holds `bad`, whether a bad condition holds or how bad the step is (G_bad sees that step alone),
+    after `reset` the episode's `physics`, and when terminated the reason as `stop`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -49,7 +49,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._records = []
         observed = self._environment.observed([self._environment.record()])
         self._last = self._row(observed)
-        return self._last, {"physics": physics, "bad": bool(self._setup.task.is_bad(observed).any())}
+        return self._last, {"physics": physics, "bad": self._bad(observed)}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply one command for one control step."""
@@ -66,7 +66,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
             return self._last, reward, True, False, _ended(reason)
         truncated = len(self._records) >= self._setup.horizon
         reward = self._objective(self._setup.task.objective) if truncated else 0.0
-        return self._last, reward, False, truncated, {"bad": bool(self._setup.task.is_bad(observed).any())}
+        return self._last, reward, False, truncated, {"bad": self._bad(observed)}
 
     def close(self) -> None:
         """End the simulation."""
@@ -74,6 +74,9 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _row(self, observed: Observed) -> np.ndarray:
         return np.clip(observed.xi[:, 0], self._seen.low, self._seen.high)
+
+    def _bad(self, observed: Observed) -> bool | float:
+        return self._setup.task.is_bad(observed).max().item()
 
     def _objective(self, of: Callable[[Observed, np.ndarray], float]) -> float:
         whole = self._environment.observed(self._records)

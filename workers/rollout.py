@@ -22,11 +22,15 @@ from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
+from workers.tasks.task import Bad
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
 
 DIVERGED = "diverged"
+
+Stored = UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
+"""Per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,8 @@ class Episode:
     Attributes:
         x: the controller, in [0,1]^D.
         xi: the trajectory ξ, in the units of the setup's channels.
-        bad: per step, one bit for each bad condition.
-        y: badness, the fraction of bad steps, in [0, 1].
+        bad: per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad.
+        y: badness, the fraction of bad steps or the mean degree, in [0, 1].
         f: the objective.
         stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded, or
             the reason of the setup's stop rule. From there on ξ repeats the last state.
@@ -50,7 +54,7 @@ class Episode:
 
     x: Float32[np.ndarray, " d"]
     xi: Float32[np.ndarray, "obs time"]
-    bad: UInt8[np.ndarray, " time"]
+    bad: Stored
     y: float
     f: float
     stop: str
@@ -113,23 +117,26 @@ def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physi
         return _diverged(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
     objective = setup.task.stopped_objective if reason else setup.task.objective
-    bad = _stopped(_bits(is_bad), setup) if reason else _bits(is_bad)
+    bad = _stopped(_stored(is_bad), setup) if reason else _stored(is_bad)
     return Episode(
         x=x,
         xi=_held(observed.xi, setup.horizon),
         bad=bad,
-        y=float((bad != 0).mean()),
+        y=float(degrees(bad).mean(dtype=np.float64)),
         f=float(np.float32(objective(observed, is_bad))),
         stop=reason,
         physics=physics,
     )
 
 
-def _stopped(bad: UInt8[np.ndarray, " run"], setup: Setup) -> UInt8[np.ndarray, " time"]:
-    """The bits of all T steps: `stopped` from the last that was run, and nothing else where none was."""
-    whole = np.zeros(setup.horizon, dtype=np.uint8)
+def _stopped(bad: UInt8[np.ndarray, " run"] | Float32[np.ndarray, " run"], setup: Setup) -> Stored:
+    """All T steps: `stopped` from the last that was run, and nothing else where none was; degrees of 1."""
+    whole = np.zeros(setup.horizon, dtype=bad.dtype)
     whole[: len(bad)] = bad
-    whole[len(bad) - 1 :] |= np.uint8(1 << setup.conditions.index(STOPPED))
+    if setup.task.graded:
+        whole[len(bad) - 1 :] = 1.0
+    else:
+        whole[len(bad) - 1 :] |= np.uint8(1 << setup.conditions.index(STOPPED))
     return whole
 
 
@@ -145,7 +152,7 @@ def _diverged(
     """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
     if not sane.size:
         sane = np.array([[(channel.low + channel.high) / 2] for channel in setup.observation], np.float32)
-    bad = np.full(setup.horizon, 2 ** len(setup.conditions) - 1, dtype=np.uint8)
+    bad = _stored(np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool))
     return Episode(x, _held(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
@@ -163,6 +170,11 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     return int(insane[0]) if insane.size else xi.shape[1]
 
 
-def _bits(is_bad: Bool[np.ndarray, "conditions time"]) -> UInt8[np.ndarray, " time"]:
-    """One bit per condition, the first condition lowest."""
-    return np.packbits(is_bad, axis=0, bitorder="little")[0]
+def degrees(bad: Stored) -> Bool[np.ndarray, " time"] | Float32[np.ndarray, " time"]:
+    """How bad each step is: the degree itself, or whether any bit is set."""
+    return bad if bad.dtype == np.float32 else bad != 0
+
+
+def _stored(is_bad: Bad) -> Stored:
+    """Degrees as they are; otherwise one bit per condition, the first condition lowest."""
+    return is_bad[0] if is_bad.dtype == np.float32 else np.packbits(is_bad, axis=0, bitorder="little")[0]

@@ -1,9 +1,15 @@
 """Setups by name: an environment, a controller and a task that belong together."""
 
 import difflib
+import hashlib
+import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
 
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
@@ -16,11 +22,13 @@ MODULES = {
     "daisy-27d": "workers.environments.daisy_27d",
     "daisy-11d": "workers.environments.daisy_11d",
     "daisy-11d-rehearsal": "workers.environments.daisy_11d_rehearsal",
+    "quadratic-30d": "workers.environments.quadratic_30d",
+    "quadratic-30d-intrinsic-3": "workers.environments.quadratic_30d_intrinsic_3",
     "franka-rehearsal": "workers.environments.franka_rehearsal",
     "yumi": "workers.environments.yumi",
     "yumi-rehearsal": "workers.environments.yumi_rehearsal",
 }
-"""A new robot is one module that offers `setup()`, and one line here."""
+"""A new robot is one module that offers `setup()`, and one line here; none for a module of the user's own."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,7 @@ class Setup:
     """A robot, its controller and its task.
 
     Attributes:
-        name: as on the command line.
+        name: as on the command line; of a user's module, the module's name.
         build: makes the simulated environment.
         controller: the parametric controller.
         task: G_bad and the objective.
@@ -40,6 +48,7 @@ class Setup:
         objective_limits: the range of f, fixed; BO scales f by it.
         success: an episode with f above this succeeded.
         stop: ends an episode early; of stand-ins for hardware only.
+        code: SHA-256 of the file of a user's module; "" for the setups that ship.
     """
 
     name: str
@@ -54,6 +63,7 @@ class Setup:
     objective_limits: tuple[float, float]
     success: float
     stop: StopRule = never
+    code: str = ""
 
     @property
     def dimensions(self) -> int:
@@ -62,8 +72,12 @@ class Setup:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Names of the bad conditions, in the order of their bits; `stopped` comes last if it may be."""
-        return self.task.conditions if self.stop is never else (*self.task.conditions, STOPPED)
+        """Names of the bad conditions, in the order of their bits; `stopped` comes last if it may be.
+
+        A graded G_bad has no bits: a stop gives its steps the degree 1.
+        """
+        bits = self.stop is not never and not self.task.graded
+        return (*self.task.conditions, STOPPED) if bits else self.task.conditions
 
     def open(self) -> Environment:
         """Start the simulated environment; close it, or use it in a `with` block."""
@@ -97,5 +111,44 @@ def known(name: str, kind: str, names: Mapping[str, object]) -> str:
 
 
 def load(name: str) -> Setup:
-    """The setup of that name; an unknown one raises `LookupError` and names the nearest."""
-    return import_module(MODULES[known(name, "setup", MODULES)]).setup()
+    """The setup of that name, or of the importable module of that name, which offers `setup()`.
+
+    Raises:
+        LookupError: there is neither (it names the nearest), or the module is not as it must be.
+    """
+    if name in MODULES or not _is_module(name):
+        return import_module(MODULES[_shipped(name)]).setup()
+    made = getattr(imported(name), "setup", lambda: None)()
+    if not isinstance(made, Setup):
+        raise LookupError(
+            f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
+        )
+    return replace(made, name=name, code=file_digest(imported(name)))
+
+
+def _shipped(name: str) -> str:
+    try:
+        return known(name, "setup", MODULES)
+    except LookupError as error:
+        raise LookupError(f"{error.args[0]}; nor is there a module of that name to import") from error
+
+
+def imported(name: str) -> ModuleType:
+    """A user's module; one that cannot be imported raises `LookupError` with the reason."""
+    try:
+        return import_module(name)
+    except (ImportError, SyntaxError) as error:
+        raise LookupError(
+            f"cannot import the module {name!r}: {error}; it must be in the working directory or on "
+            "PYTHONPATH, on every machine of the cluster"
+        ) from error
+
+
+def file_digest(part: object) -> str:
+    """SHA-256 of the file that defines a module or function."""
+    return hashlib.sha256(Path(inspect.getfile(cast(Any, part))).read_bytes()).hexdigest()
+
+
+def _is_module(name: str) -> bool:
+    parts = name.split(".")
+    return all(part.isidentifier() for part in parts) and (len(parts) > 1 or find_spec(name) is not None)

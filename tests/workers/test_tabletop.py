@@ -202,7 +202,7 @@ def test_a_robot_description_that_does_not_load_is_named(tmp_path, text):
     path.write_text(text)
     with (
         World(time_step=0.002, solver_iterations=10) as world,
-        pytest.raises(ValueError, match=r"broken\.urdf must be a URDF that Bullet can load"),
+        pytest.raises(ValueError, match=r"broken\.urdf does not load as a URDF"),
     ):
         Arm(world, replace(franka.ARM, urdf=str(path)))
 

@@ -14,7 +14,7 @@ from jaxtyping import Float32, Int64
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
-from workers.dataset.schema import Columns
+from workers.dataset.schema import Columns, degree
 from workers.rollout import DIVERGED
 
 _READY = "cache.json"
@@ -34,7 +34,7 @@ class TrainingCache:
         episode: indices.
         x: controllers in [0,1]^D.
         xi: trajectories in the units of the setup's channels, the last step of every stride.
-        bad: 1 where a bad condition held at the sampled step, else 0.
+        bad: 1 where a bad condition held at the sampled step, else 0; the degree of a graded G_bad.
         y: badness over all T steps.
         f: objective.
     """
@@ -166,7 +166,7 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
         "episode": columns.episode[sane],
         "x": columns.x[sane],
         "xi": columns.xi[sane][:, :, last],
-        "bad": (columns.bad[sane][:, last] != 0).astype(np.float32),
+        "bad": degree(columns.bad[sane][:, last]),
         "y": columns.y[sane],
         "f": columns.f[sane],
     }
@@ -174,7 +174,7 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
 
 def _require_finite(rows: Mapping[str, np.ndarray], path: Path) -> None:
     """Refuse what would turn the model's every weight into NaN many updates later."""
-    for name in ("x", "xi", "y", "f"):
+    for name in ("x", "xi", "bad", "y", "f"):
         strange = ~np.isfinite(rows[name]).reshape(len(rows[name]), -1).all(axis=1)
         if strange.any():
             raise ValueError(

@@ -36,6 +36,10 @@ class Identity:
         pybullet: version.
         numpy: version.
         repeats: R, episodes of each controller, under different physics each.
+        bad_kind: `bits`, one per condition and step, or `graded`, a degree per step.
+        bad_name: `module:function` of a user's G_bad; "" for the setup's own.
+        bad_digest: SHA-256 of the file that defines it.
+        setup_digest: SHA-256 of the file of a user's setup; "" for those that ship.
         storage: how ξ is stored: `float32`, or `int16` codes between the bounds of its channels.
     """
 
@@ -53,6 +57,10 @@ class Identity:
     pybullet: str
     numpy: str
     repeats: int = 1
+    bad_kind: str = "bits"
+    bad_name: str = ""
+    bad_digest: str = ""
+    setup_digest: str = ""
     storage: str = "float32"
 
     def __post_init__(self) -> None:
@@ -120,6 +128,10 @@ def identity_of(
         pybullet=version("pybullet"),
         numpy=version("numpy"),
         repeats=repeats,
+        bad_kind="graded" if setup.task.graded else "bits",
+        bad_name=setup.task.bad_name,
+        bad_digest=setup.task.bad_digest,
+        setup_digest=setup.code,
         storage=storage,
     )
 

@@ -147,7 +147,11 @@ def _features(identity: Identity) -> dict[str, dict[str, Any]]:
     names = [name for name, *_ in identity.observation]
     return {
         "observation.state": {"dtype": "float32", "shape": [len(names)], "names": names},
-        "bad": {"dtype": "uint8", "shape": [1], "names": None},
+        "bad": {
+            "dtype": "float32" if identity.bad_kind == "graded" else "uint8",
+            "shape": [1],
+            "names": None,
+        },
         "timestamp": {"dtype": "float32", "shape": [1], "names": None},
         **{name: {"dtype": "int64", "shape": [1], "names": None} for name in _INDICES},
     }

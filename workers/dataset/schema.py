@@ -18,8 +18,13 @@ from workers.dataset.quantisation import described, restored, stored
 from workers.rollout import Episode
 
 ROW_GROUP = 64  # episodes
-_XI = "xi.list.element"
+_XI, _BAD = "xi.list.element", "bad.list.element"
 _SPLIT = ["x.list.element", _XI, "y", "f"]
+_BITS = "one bit per condition, the first condition lowest"
+_GRADED = "degree of badness of each step, in [0, 1]"
+
+Bad = UInt8[np.ndarray, "n time"] | Float32[np.ndarray, "n time"]
+"""Bits of the bad conditions per step, or degrees of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +32,13 @@ class Outcomes:
     """How episodes went, without their trajectories, in the order of the file.
 
     Attributes:
-        bad: bits of the bad conditions per step.
+        bad: bits of the bad conditions per step, or degrees of a graded G_bad.
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
     """
 
-    bad: UInt8[np.ndarray, "n time"]
+    bad: Bad
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
     stop: tuple[str, ...]
@@ -47,7 +52,7 @@ class Columns:
         episode: indices.
         x: controllers.
         xi: trajectories, channel-major.
-        bad: bits of the bad conditions per step.
+        bad: bits of the bad conditions per step, or degrees of a graded G_bad.
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
@@ -57,7 +62,7 @@ class Columns:
     episode: Int64[np.ndarray, " n"]
     x: Float32[np.ndarray, "n d"]
     xi: Float32[np.ndarray, "n obs time"]
-    bad: UInt8[np.ndarray, "n time"]
+    bad: Bad
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
     stop: tuple[str, ...]
@@ -76,20 +81,24 @@ def schema(identity: Identity) -> pa.Schema:
                 "xi": ["observation", "time"],
                 "xi_shape": [len(identity.observation), identity.horizon],
                 **described(identity),
-                "bad": "one bit per condition, the first condition lowest",
+                "bad": _GRADED if _is_graded(identity) else _BITS,
             }
         ),
     }
-    columns = {
+    columns: dict[str, pa.DataType] = {
         "episode": pa.int64(),
         "x": pa.list_(pa.field("element", pa.float32(), nullable=False), len(identity.parameters)),
         "xi": pa.list_(pa.field("element", _kind_of_xi(identity), nullable=False), size),
-        "bad": pa.list_(pa.field("element", pa.uint8(), nullable=False), identity.horizon),
+        "bad": pa.list_(
+            pa.field("element", pa.float32() if _is_graded(identity) else pa.uint8(), nullable=False),
+            identity.horizon,
+        ),
         "y": pa.float32(),
         "f": pa.float32(),
         "stop": pa.dictionary(pa.int8(), pa.string()),
-        "physics": physics,
     }
+    if identity.physics:  # Parquet knows no structs without fields
+        columns["physics"] = physics
     return pa.schema(
         [pa.field(name, kind, nullable=False) for name, kind in columns.items()], metadata=metadata
     )
@@ -107,8 +116,9 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         "y": pa.array([episode.y for episode in episodes], type=kinds["y"]),
         "f": pa.array([episode.f for episode in episodes], type=kinds["f"]),
         "stop": pa.array([episode.stop for episode in episodes]).dictionary_encode().cast(kinds["stop"]),
-        "physics": pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"]),
     }
+    if "physics" in kinds:
+        arrays["physics"] = pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"])
     pq.write_table(
         pa.table(arrays, schema=layout),
         path,
@@ -121,12 +131,22 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
     )
 
 
+def degree(bad: Bad) -> Float32[np.ndarray, "n time"]:
+    """How bad each step is: the degree itself, or 1 where any bit is set."""
+    return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
+
+
+def _is_graded(identity: Identity) -> bool:
+    return identity.bad_kind == "graded"
+
+
 def _encodings(identity: Identity) -> dict[str, Any]:
     """Floats are split by byte; codes of int16 are stored as differences in time."""
+    split = [*_SPLIT, _BAD] if _is_graded(identity) else _SPLIT
     if identity.storage == "float32":
-        return {"use_byte_stream_split": _SPLIT}
+        return {"use_byte_stream_split": split}
     return {
-        "use_byte_stream_split": [name for name in _SPLIT if name != _XI],
+        "use_byte_stream_split": [name for name in split if name != _XI],
         "column_encoding": {_XI: "DELTA_BINARY_PACKED"},
     }
 

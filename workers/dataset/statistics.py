@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
-from workers.dataset.schema import read_outcomes
+from workers.dataset.schema import Bad, read_outcomes
 from workers.rollout import DIVERGED
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -22,7 +22,7 @@ class Statistics:
     Attributes:
         objective: quantiles of f at `MARKS`.
         badness: mean y, in [0, 1].
-        bad_steps: the share of steps in which each condition was bad, by its name.
+        bad_steps: the share of steps in which each condition was bad, or the mean degree, by its name.
         diverged: how many episodes diverged.
         stopped: how many episodes a stop rule ended, by its reason, in the order of the alphabet.
     """
@@ -42,13 +42,12 @@ def statistics(dataset: Dataset) -> Statistics:
     """
     objectives, badness, steps, stops = [], 0.0, 0, Counter[str]()
     bad = np.zeros(len(dataset.identity.conditions))
-    bits = np.arange(len(dataset.identity.conditions), dtype=np.uint8)
     for shard in dataset.shards():
         outcomes = read_outcomes(dataset.path(shard), dataset.identity)
         objectives.append(outcomes.f)
         badness += float(outcomes.y.sum(dtype=np.float64))
         stops.update(outcomes.stop)
-        bad += (outcomes.bad[..., None] >> bits & 1).sum(axis=(0, 1))
+        bad += _total(outcomes.bad, len(bad))
         steps += outcomes.bad.size
     if not objectives:
         raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
@@ -60,3 +59,10 @@ def statistics(dataset: Dataset) -> Statistics:
         diverged=stops[DIVERGED],
         stopped={reason: stops[reason] for reason in sorted(stops.keys() - {"", DIVERGED})},
     )
+
+
+def _total(bad: Bad, conditions: int) -> Float64[np.ndarray, " conditions"]:
+    """Bad steps of every condition; of a graded G_bad, the sum of its degrees."""
+    if bad.dtype == np.float32:
+        return np.array([bad.sum(dtype=np.float64)])
+    return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).sum(axis=(0, 1), dtype=np.float64)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import pybullet_data
 
 from workers.simulation.bullet import pybullet
+from workers.simulation.description import joint_indices, load_robot
 from workers.simulation.world import World
 
 Vector = tuple[float, ...]
@@ -88,10 +89,8 @@ class Arm:
         self._client = world.client
         self._model = model
         self.body = self._load(model)
-        index = self._joint_indices()
-        missing = [name for name in (*model.joints, model.hand, *model.fingers) if name not in index]
-        if missing:
-            raise ValueError(f"{model.urdf} has no joint {missing[0]!r}; it has {', '.join(index)}")
+        needed = (*model.joints, model.hand, *model.fingers)
+        index = joint_indices(self.body, self._client, model.urdf, needed)
         self._joints = [index[name] for name in model.joints]
         self._fingers = [index[name] for name in model.fingers]
         self._hand = index[model.hand]
@@ -102,21 +101,9 @@ class Arm:
 
     def _load(self, model: ArmModel) -> int:
         path = Path(pybullet_data.getDataPath()) / model.urdf
-        if not path.exists():
-            raise FileNotFoundError(f"no robot description at {path}")
         # Nobody looks: the meshes that are only seen would take 100 MB.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
-        try:
-            return pybullet.loadURDF(
-                str(path), model.base, useFixedBase=True, flags=flags, physicsClientId=self._client
-            )
-        except pybullet.error as error:
-            raise ValueError(f"{path} must be a URDF that Bullet can load: {error}") from error
-
-    def _joint_indices(self) -> dict[str, int]:
-        count = pybullet.getNumJoints(self.body, physicsClientId=self._client)
-        infos = (pybullet.getJointInfo(self.body, i, physicsClientId=self._client) for i in range(count))
-        return {info[1].decode(): info[0] for info in infos}
+        return load_robot(path, self._client, basePosition=model.base, useFixedBase=True, flags=flags)
 
     def _configure(self) -> None:
         model = self._model

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 
 from workers.environments.environment import Observed
-from workers.tasks.task import Task
+from workers.tasks.task import Bad, Task
 
 TIPPED_COSINE = cos(radians(30))  # between an object's axis and the vertical
 
@@ -60,7 +60,7 @@ class StablePush(Task):
             ]
         )
 
-    def objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:  # noqa: ARG002
+    def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
         """An object pushed off the table counts as tipped, since it would fall."""
         y_max = self.table_y[1] - self.table_y[0]
         total = 0.0
@@ -70,7 +70,7 @@ class StablePush(Task):
             total += -y_max if fallen else self.direction * (float(last[1, 0]) - y_start)
         return total
 
-    def stopped_objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:  # noqa: ARG002
+    def stopped_objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
         """−y_max for every object, as if it had fallen (section 7 of the paper: −2 y_max)."""
         return self.objective_limits[0]
 

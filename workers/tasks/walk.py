@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from workers.environments.environment import Observed
-from workers.tasks.task import Task
+from workers.tasks.task import Bad, Task
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Walk(Task):
             ]
         )
 
-    def objective(self, observed: Observed, bad: Bool[np.ndarray, "conditions time"]) -> float:
+    def objective(self, observed: Observed, bad: Bad) -> float:
         """Ten times the metres walked towards +y, less one for each step with a fast joint."""
         return 10.0 * float(observed.xi[self.channel + 1, -1]) - float(np.count_nonzero(bad[0]))
 

@@ -1,0 +1,78 @@
+"""Setups from users' own modules: found by name, refused with a reason, and told apart by their code."""
+
+import sys
+
+import pytest
+
+from workers import setups
+from workers.dataset.identity import identity_of
+
+OWN = """
+from dataclasses import replace
+from workers import setups
+
+def setup():
+    return replace(setups.load("quadratic-30d"), name="whatever")
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """A folder on Python's path, with modules and a package in it."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "box").mkdir()
+    files = {
+        "mine": OWN,
+        "box/mine": OWN,
+        "box/__init__": "",
+        "no_setup": "",
+        "number": "def setup():\n    return 3\n",
+    }
+    files |= {"lame": "import not_installed\n", "broken": "def setup(:\n"}
+    for name, text in files.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    yield tmp_path
+    for name in ("box", *(name.replace("/", ".") for name in files)):
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.parametrize("name", ["mine", "box.mine"])
+def test_a_module_is_a_setup_under_its_own_name(name):
+    assert setups.load(name).name == name
+    assert setups.load(name).dimensions == 30
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (
+            "no_setup",
+            r"module 'no_setup' must offer a function setup\(\) that returns a workers\.setups\.Setup",
+        ),
+        ("number", r"module 'number' must offer a function setup\(\)"),
+        ("lame", "cannot import the module 'lame': No module named 'not_installed'"),
+        ("broken", r"cannot import the module 'broken': .*broken\.py, line 1"),
+        ("box.other", r"cannot import the module 'box\.other': No module named 'box\.other'; .*PYTHONPATH"),
+        ("mien", "unknown setup 'mien'; did you mean"),
+        ("", "unknown setup ''"),
+        ("franka-2", "unknown setup 'franka-2'; did you mean 'franka'"),
+    ],
+)
+def test_a_module_that_is_no_setup_is_refused_with_the_reason(name, message):
+    with pytest.raises(LookupError, match=message):
+        setups.load(name)
+
+
+def test_another_version_of_a_users_module_has_another_identity(folder):
+    def identity():
+        return identity_of(setups.load("mine"), seed=0, episodes_per_shard=8)
+
+    before = identity()
+    assert identity().digest == before.digest
+    (folder / "mine.py").write_text(OWN + "# changed\n")
+    assert [line.split(":")[0] for line in before.differences(identity())] == ["setup_digest"]
+
+
+def test_setups_that_ship_leave_no_trace_of_their_code_in_the_identity():
+    identity = identity_of(setups.load("quadratic-30d"), seed=0, episodes_per_shard=8)
+    assert "setup_digest" not in identity.to_json()

@@ -1,0 +1,26 @@
+"""The simplest controller: x itself, in every step."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from workers.controllers.controller import Command, Controller
+from workers.environments.environment import Channel
+
+
+@dataclass(frozen=True)
+class Constant(Controller):
+    """Commands the physical values of x from the first step to the last.
+
+    Attributes:
+        parameters: one for every command channel.
+    """
+
+    parameters: tuple[Channel, ...]
+
+    def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
+        """The same command in every step."""
+        command = self.values(x).tolist()
+        return lambda _: command
