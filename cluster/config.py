@@ -112,8 +112,9 @@ class TrainSettings(Section):
     """Family of all four distributions."""
     head: Literal["preset", "low-rank", "dense"] = "preset"
     """Output of p(xi|tau)."""
-    weighting: Literal["preset", "paper", "balanced"] = "preset"
-    """Weights of the bound's terms: the paper's equation, or one that keeps psi alive."""
+    weighting: Literal["preset", "paper", "hybrid", "balanced"] = "preset"
+    """Weights of the bound's terms: the paper's equation; with generation from x; and with a weight that keeps
+    psi alive."""
     kl_weight: NonNegativeFloat | Literal["preset"] = "preset"
     """Of the KL term; 1 is the paper's equation."""
     learning_rate: PositiveFloat | Literal["preset"] = "preset"

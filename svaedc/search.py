@@ -8,6 +8,7 @@ from typing import Final, Protocol, runtime_checkable
 import numpy as np
 import torch
 from botorch.acquisition.acquisition import AcquisitionFunction
+from botorch.exceptions.warnings import BotorchWarning
 from botorch.models.deterministic import GenericDeterministicModel
 from botorch.optim.optimize import optimize_acqf
 from jaxtyping import Float32
@@ -97,7 +98,8 @@ class ByGradient:
         """
         with torch_randomness(rng), warnings.catch_warnings():
             # A flat acquisition, as after equal outcomes, makes BoTorch warn of every starting point.
-            warnings.simplefilter("ignore")
+            for category in (BotorchWarning, RuntimeWarning):
+                warnings.simplefilter("ignore", category)
             best, _ = optimize_acqf(
                 _OnControllers(value, candidates),
                 torch.stack([candidates.low, candidates.high]),

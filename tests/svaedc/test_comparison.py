@@ -50,7 +50,7 @@ def test_records_say_what_the_evaluation_showed():
         assert (trial.y, trial.success, trial.status, trial.stop) == (0.25, trial.f > 0.9, "ok", "")
 
 
-@pytest.mark.parametrize("name", ["random", "svae-dc", "botorch"])
+@pytest.mark.parametrize("name", ["random", "svae-dc", "turbo"])
 @pytest.mark.parametrize("done", [0, 1, 2, 4])
 def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(name, done):
     whole = list(run(name, count=3))
