@@ -1,7 +1,7 @@
 """Updates per CPU second of training: compact and paper, cache and memory, our loop and a plain one.
 
-Prints ratios of CPU time, medians of interleaved rounds in one run, with one thread; `--rounds N` repeats more
-often. The last ratio has our loop as a process of Ray Train runs it, with its checkpoints and reports.
+Prints ratios of CPU time, medians of interleaved rounds in one run, with one thread; `--rounds N` repeats
+more often. The last ratio has our loop as a process of Ray Train runs it, with its checkpoints and reports.
 """
 
 import argparse
@@ -15,16 +15,24 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from ray.train import RunConfig, ScalingConfig
+from ray.train.torch import TorchTrainer
 from torch import nn
 
+from cluster.collect import collect
+from cluster.config import CollectSettings, RaySettings, TrackingSettings
+from cluster.session import connect
+from cluster.tracking import open_tracker
+from cluster.training_job import TrainingJob, episodes, trained
 from svaedc.episodes import Episodes, split
 from svaedc.model import initialised
 from svaedc.presets import Sizes, compact, paper
 from svaedc.training import fit
+from workers import setups
 
 COUNT, D, OBSERVATIONS = 2_000, 48, 25
 STEPS = {1: 500, 5: 100}
-BOUNDS = [0.0] * OBSERVATIONS, [1.0] * OBSERVATIONS
+BOUNDS = ([0.0] * OBSERVATIONS, [1.0] * OBSERVATIONS)
 UPDATES = 250  # one epoch with its measures on held-out episodes
 
 
@@ -85,24 +93,54 @@ def plain(halves, preset):
     return (time.process_time() - begin) / settings.joint.updates
 
 
-def under_ray(session, folder, updates):
-    """CPU seconds per update of both stages' loop in a process of Ray Train, and of the joint one in this."""
+class Clock:
+    """Takes the place of the mailbox: notes the process's CPU time whenever the job reports."""
+
+    def __init__(self):
+        self.put, self.marks = self, []
+
+    def remote(self, message):
+        """Note one report."""
+        self.marks.append((message.get("stage"), time.process_time()))
+
+
+def worker(config):
+    """CPU seconds per update of the joint stage in a process of Ray Train, checkpoints included."""
     import ray.train
-    from ray.train import RunConfig, ScalingConfig
-    from ray.train.torch import TorchTrainer
 
-    from cluster.mailbox import mailbox
-    from cluster.training_job import TrainingJob, trained
+    torch.set_num_threads(1)
+    config["job"].data()
+    clock = Clock()
+    trained(config["job"], clock)
+    last = [seconds for stage, seconds in clock.marks if stage == "joint"][-1]
+    (config["job"].model / "seconds").write_text(str((last - clock.marks[0][1]) / UPDATES))
+    ray.train.report({})
 
-    def worker(config):
-        torch.set_num_threads(1)
-        config["job"].data()
-        begin = time.process_time()
-        trained(config["job"], config["mailbox"])
-        (config["job"].model / "seconds").write_text(str(time.process_time() - begin))
-        ray.train.report({})
 
-    return worker
+def under_ray(folder, session):
+    """CPU seconds per update under Ray Train, and of the plain loop on the same episodes here."""
+    tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db"))
+    dataset = collect(
+        setup=setups.load("franka"),
+        episodes=1024,
+        folder=folder / "dataset",
+        seed=0,
+        settings=CollectSettings(episodes_per_shard=128),
+        session=session,
+        tracker=tracker,
+    )
+    (folder / "model").mkdir()
+    paths = [(folder / name).resolve() for name in ("dataset", "model", "cache")]
+    origin = {"dataset": dataset.fingerprint()}
+    job = TrainingJob(*paths, origin, "compact", UPDATES, 5, 0, math.inf, 1)
+    TorchTrainer(
+        worker,
+        train_loop_config={"job": job},
+        scaling_config=ScalingConfig(num_workers=1),
+        run_config=RunConfig(storage_path=str(folder / "ray")),
+    ).fit()
+    preset = job.settings(job.data())
+    return float((job.model / "seconds").read_text()), plain(episodes(job.data()), preset)
 
 
 def ratio(rounds, numerator, denominator):
@@ -154,6 +192,10 @@ def main():
         ]
         for label, target, numerator, denominator in rows:
             print(f"  {label:<60}{ratio(rounds, numerator, denominator):6.2f}   target {target}", flush=True)
+        with connect(RaySettings(num_cpus=2), address=None) as session:
+            ray_seconds, plain_seconds = under_ray(Path(name), session)
+        label = "our loop under Ray Train / a plain PyTorch loop"
+        print(f"  {label:<60}{plain_seconds / ray_seconds:6.2f}   target >= 0.9", flush=True)
         print(f"  {'CPU time of one update, compact':<60}{1e3 * ours(memory[5], small):6.0f} ms")
 
 

@@ -14,6 +14,7 @@ STRIDE: Final = 2
 _CHOICES: Final = {
     "distribution": ("laplace", "gaussian"),
     "head": ("low-rank", "dense"),
+    "trunk": ("mlp", "deconv"),
     "prior": ("mlp", "deconv"),
     "posterior_input": ("residual", "scaled"),
 }
@@ -54,10 +55,12 @@ class ModelConfig:
             which knows nothing of badness.
         distribution: Family of all four networks, `laplace` (the paper) or `gaussian`.
         head: Output of p(xi|tau): `dense` (the paper) or `low-rank` (ours).
+        trunk: Hidden layers of p(xi|tau): `deconv` (the paper) or `mlp` (ours).
         prior: p(tau, psi|x): `deconv` (the paper) or `mlp` (ours).
         posterior_input: What q sees of xi: `scaled` to the observation range (the paper), or the `residual`
             around the per-step median in units of each dimension's spread (ours).
-        channels: Convolution channels of q, reversed in p(xi|tau).
+        channels: Convolution channels of q, reversed in the `deconv` trunk of p(xi|tau).
+        decoder_hidden: Hidden units of the `mlp` trunk of p(xi|tau).
         rank: Coefficients of the low-rank head.
         prior_hidden: Channels (`deconv`) or hidden units (`mlp`) of p(tau, psi|x).
         badness_hidden: Hidden units of p(y|psi).
@@ -75,9 +78,11 @@ class ModelConfig:
     psi_dim: int = 1
     distribution: str = "laplace"
     head: str = "low-rank"
+    trunk: str = "mlp"
     prior: str = "mlp"
     posterior_input: str = "residual"
     channels: tuple[int, ...] = (32, 64, 128)
+    decoder_hidden: tuple[int, ...] = (384, 384)
     rank: int = 80
     prior_hidden: tuple[int, ...] = (384, 384, 384)
     badness_hidden: tuple[int, ...] = (64, 64)
@@ -94,7 +99,7 @@ class ModelConfig:
             _require_positive(name, [getattr(self, name)])
         if self.psi_dim < 0:
             raise ValueError(f"psi_dim must be at least 1, or 0 for the SVAE, got {self.psi_dim}")
-        for name in ("channels", "prior_hidden", "badness_hidden"):
+        for name in ("channels", "decoder_hidden", "prior_hidden", "badness_hidden"):
             _require_positive(name, getattr(self, name))
         if encoded_length(self.time_steps, len(self.channels)) < 1:
             raise ValueError(

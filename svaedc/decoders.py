@@ -1,5 +1,6 @@
 """Heads of p(xi|tau): the paper's dense one and a low-rank one around the median trajectory."""
 
+from itertools import pairwise
 from typing import Final, final
 
 import torch
@@ -13,8 +14,8 @@ from svaedc.normaliser import Statistics
 
 
 @final
-class DecoderTrunk(nn.Module):
-    """Reverse of the encoder: transposed convolutions over the latent path, its dimensions as channels."""
+class DeconvTrunk(nn.Module):
+    """The paper's reverse of the encoder: transposed convolutions over the latent path."""
 
     def __init__(self, config: ModelConfig) -> None:
         """Build from the sizes in `config`."""
@@ -29,13 +30,33 @@ class DecoderTrunk(nn.Module):
 
 
 @final
+class MlpTrunk(nn.Module):
+    """MLP over the flattened latent path, a departure: cheaper, and better at decoding means of p(tau|x)."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        """Build from the sizes in `config`."""
+        super().__init__()
+        sizes = (config.tau_size, *config.decoder_hidden)
+        layers = [[nn.Linear(a, b), nn.ReLU()] for a, b in pairwise(sizes)]
+        self.hidden = nn.Sequential(*(module for layer in layers for module in layer))
+        self.features = sizes[-1]
+
+    def forward(self, tau: Float[Tensor, "batch tau"]) -> Float[Tensor, "batch features"]:
+        """Features of each flattened latent path."""
+        return self.hidden(tau)
+
+
+TRUNKS: Final[dict[str, type[DeconvTrunk] | type[MlpTrunk]]] = {"deconv": DeconvTrunk, "mlp": MlpTrunk}
+
+
+@final
 class DenseHead(nn.Module):
     """The paper's p(xi|tau): a dense layer from the trunk to location and scale of every element of xi."""
 
     def __init__(self, config: ModelConfig) -> None:
         """Build from the sizes in `config`."""
         super().__init__()
-        self.trunk = DecoderTrunk(config)
+        self.trunk = TRUNKS[config.trunk](config)
         self.shape = (2, config.observation_dim, config.time_steps)
         self.output = nn.Linear(self.trunk.features, 2 * config.observation_dim * config.time_steps)
         self.family = FAMILIES[config.distribution]
@@ -67,7 +88,7 @@ class LowRankHead(nn.Module):
         """Build from the sizes in `config`."""
         super().__init__()
         observations, steps = config.observation_dim, config.time_steps
-        self.trunk = DecoderTrunk(config)
+        self.trunk = TRUNKS[config.trunk](config)
         self.coefficients = nn.Linear(self.trunk.features, config.rank)
         self.basis = nn.Parameter(0.1 * torch.randn(config.rank, observations, steps))
         self.raw_scale = nn.Linear(self.trunk.features, observations)

@@ -10,14 +10,15 @@ from torch import Tensor
 from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.model import SvaeDc
 
+_MEANS: Final = ("log_p_xi", "log_p_y", "minus_log_q", "kl", "log_p_xi_from_x", "log_p_y_from_x")
 ACTIVE_SHARE_OF_SPREAD: Final = 0.1
 """Active: E[tau_d|x] spreads over controllers by at least this share of the aggregate posterior."""
 
-REMEDIES: Final = {
-    "active_share": "lower the KL weight, lengthen its warm-up, or train longer",
-    "corr_y_rec": "use the `balanced` weighting, which raises the weight of y",
-    "rec_norm": "raise the learning rate or train longer",
-    "gen_norm": "collect more episodes, or train the prior longer",
+REMEDIES: Final = {  # in brackets the setting, as the section `train` names it
+    "active_share": "lower the KL weight (kl_weight) or train longer (updates)",
+    "corr_y_rec": "raise the weight of y (weighting=balanced)",
+    "rec_norm": "raise the learning rate (learning_rate) or train longer (updates)",
+    "gen_norm": "collect more episodes, or train longer (updates)",
 }
 
 
@@ -35,7 +36,8 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
         `mae_y_rec`, `mae_y_gen`; `active_dimensions`, `active_share` and the `latent_spread/NN` of each
         dimension that they count, the standard deviation of E[tau_d|x] over controllers in parts of that of
         the aggregate posterior; and, per episode and unweighted, the four terms `log_p_xi`, `log_p_y`,
-        `log_p_latent` and `minus_log_q`, their sum `elbo`, and `kl`, minus the sum of the last two.
+        `log_p_latent` and `minus_log_q`, their sum `elbo`, and `kl`, minus the sum of the last two; and
+        `log_p_xi_from_x` and `log_p_y_from_x`, the first two terms at the means of p(tau, psi|x).
 
     Raises:
         ValueError: Fewer than two episodes: nothing varies.
@@ -71,10 +73,13 @@ def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *re
     q, p = model.posterior(batch.xi, batch.bad, batch.y), model.prior(batch.x)
     (q_tau, q_psi), (p_tau, p_psi) = model.split(q.loc), model.split(p.loc)
     xi = model.normaliser.scaled(batch.xi)
+    log_p_xi_from_x, log_p_y_from_x = model.generation_terms(p, batch.xi, batch.y)
     return {
         "median_error": (model.normaliser.median - xi).abs().mean(-1),
         "rec_error": (model.p_xi(q_tau).loc - xi).abs().mean(-1),
         "gen_error": (model.p_xi(p_tau).loc - xi).abs().mean(-1),
+        "log_p_xi_from_x": log_p_xi_from_x,
+        "log_p_y_from_x": log_p_y_from_x,
         "y": batch.y,
         "y_rec": _predicted(model, q_psi),
         "y_gen": _predicted(model, p_psi),
@@ -100,7 +105,7 @@ def _summary(measured: dict[str, Tensor]) -> dict[str, float]:
         "active_dimensions": active.double().sum(),
         "active_share": active.double().mean(),
         **{f"latent_spread/{d:02d}": each for d, each in enumerate(spread)},
-        **{name: measured[name].mean() for name in ("log_p_xi", "log_p_y", "minus_log_q", "kl")},
+        **{name: values.mean() for name, values in measured.items() if name in _MEANS},
     }
     for name in ("rec", "gen"):
         summary[f"mae_y_{name}"] = (measured["y"] - measured[f"y_{name}"]).abs().mean()

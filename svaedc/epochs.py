@@ -75,7 +75,7 @@ class Run:
         """Stage by name, built on the model as it is now."""
         if name == "joint":
             return JointStage(self.model, self.training, self.settings)
-        return PriorStage(self.model, self.training, self.held_out, self.settings)
+        return PriorStage(self.model, self.training, self.settings)
 
 
 @final
@@ -98,6 +98,8 @@ class Loop:
     def epochs(self, done: int) -> Iterator[EpochReport]:
         """Epochs of the stage that are left, each a fixed number of updates."""
         size, total = self._run.settings.epoch_updates, self._stage.settings.updates
+        if not done:
+            self._stage.end_epoch(evaluate(self._run.model, self._measured_on))
         for epoch in range(done, -(-total // size)):
             updates = range(epoch * size, min((epoch + 1) * size, total))
             metrics = self._epoch(epoch, updates)

@@ -81,6 +81,17 @@ class SvaeDc(nn.Module):
         log_p_xi, log_p_y, kl = self(x, xi, bad, y)
         return log_p_xi + log_p_y - kl
 
+    def generation_terms(
+        self,
+        p: Diagonal,
+        xi: Float[Tensor, "batch obs time"],
+        y: Float[Tensor, " batch"],
+    ) -> tuple[Float[Tensor, " batch"], Float[Tensor, " batch"]]:
+        """Terms log p(xi|tau) and log p(y|psi) at the means of p = p(tau, psi|x): what x alone tells."""
+        tau, psi = self.split(p.loc)
+        log_p_y = self.p_y(psi).log_prob(y) if self.config.has_psi else torch.zeros_like(y)
+        return self.p_xi(tau).log_prob(self.normaliser.scaled(xi)), log_p_y
+
     def posterior(
         self,
         xi: Float[Tensor, "batch obs time"],

@@ -39,6 +39,7 @@ def paper(sizes: Sizes) -> Preset:
         sizes.time_steps,
         distribution="laplace",
         head="dense",
+        trunk="deconv",
         prior="deconv",
         posterior_input="scaled",
         prior_hidden=(512, 256, 128, 128),
@@ -68,7 +69,7 @@ def compact(sizes: Sizes) -> Preset:
     mixed or noisy x in stage two left the generated error of the first seed between .71 and .75.
     """
     joint = StageSettings(
-        updates=3_000,
+        updates=4_000,
         optimiser="adam",
         schedule="cosine",
         learning_rate=1e-3,
@@ -76,9 +77,9 @@ def compact(sizes: Sizes) -> Preset:
         dropout=0.0,
         gradient_norm=1.0,
     )
-    prior = replace(joint, dropout=0.3, weight_decay=1e-2)
+    prior = replace(joint, updates=1_000, dropout=0.3, weight_decay=1e-2)
     model = ModelConfig(sizes.controller_dim, sizes.observation_dim, sizes.time_steps)
-    return Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["paper"], batch_size=128))
+    return Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["hybrid"], batch_size=128))
 
 
 PRESETS: Final[dict[str, Callable[[Sizes], Preset]]] = {"paper": paper, "compact": compact}

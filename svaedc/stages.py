@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, final
 
 import numpy as np
@@ -12,7 +13,10 @@ from torch import Tensor, nn
 from svaedc.distributions import FAMILIES, Diagonal, kl_divergence
 from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.model import SvaeDc
-from svaedc.settings import StageSettings, TrainingSettings
+from svaedc.settings import StageSettings, TrainingSettings, Weighting
+
+Terms = dict[str, Float[Tensor, ""]]
+"""Means over a batch, unweighted, by name."""
 
 
 class Stage(ABC):
@@ -38,7 +42,7 @@ class Stage(ABC):
     @abstractmethod
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
-    ) -> tuple[Float[Tensor, ""], dict[str, Float[Tensor, ""]]]:
+    ) -> tuple[Float[Tensor, ""], Terms]:
         """Loss of the training episodes at `positions`, and the unweighted terms behind it.
 
         `wrapped` is `module`, possibly wrapped for distributed training.
@@ -87,15 +91,34 @@ class Stage(ABC):
 
 
 @final
+class Objective(nn.Module):
+    """The terms of stage one, all networks together."""
+
+    def __init__(self, model: SvaeDc, weighting: Weighting) -> None:
+        """Compute the terms of `model` that have a weight."""
+        super().__init__()
+        self.model = model
+        self.generates = weighting.generation > 0.0
+
+    def forward(self, batch: Batch) -> Terms:
+        """Mean of each term over a batch."""
+        log_p_xi, log_p_y, kl = (term.mean() for term in self.model(*batch))
+        terms = {"elbo": log_p_xi + log_p_y - kl, "log_p_xi": log_p_xi, "log_p_y": log_p_y, "kl": kl}
+        if self.generates:
+            terms |= _from_x(self.model.generation_terms(self.model.prior(batch.x), batch.xi, batch.y))
+        return terms
+
+
+@final
 class JointStage(Stage):
-    """Stage one: log p(xi|tau) + w_y log p(y|psi) - w_kl KL(q || p(.|x)), all networks together."""
+    """Stage one: log p(xi|tau) + w_y log p(y|psi) - w_kl KL(q || p(.|x)), and perhaps generation from x."""
 
     name = "joint"
 
     def __init__(self, model: SvaeDc, training: Episodes, settings: TrainingSettings) -> None:
         """Train `model` on the `training` episodes."""
         super().__init__()
-        self.module = model
+        self.module = Objective(model, settings.weighting)
         self.settings = settings.joint
         self._training = training
         self._weighting = settings.weighting
@@ -103,38 +126,43 @@ class JointStage(Stage):
 
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
-    ) -> tuple[Float[Tensor, ""], dict[str, Float[Tensor, ""]]]:
+    ) -> tuple[Float[Tensor, ""], Terms]:
         """Weighted negative bound per element of xi."""
-        batch = self._training.gather(positions, next(wrapped.parameters()).device)
-        log_p_xi, log_p_y, kl = (term.mean() for term in wrapped(*batch))
-        weighted = log_p_xi + self._weighting.y * log_p_y - self._weighting.kl_at(self.progress) * kl
-        terms = {"elbo": log_p_xi + log_p_y - kl, "log_p_xi": log_p_xi, "log_p_y": log_p_y, "kl": kl}
-        return -weighted / self._elements, terms
+        terms = wrapped(self._training.gather(positions, next(wrapped.parameters()).device))
+        return self._weighted(terms, self._weighting.kl_at(self.progress)), terms
 
     def held_out_loss(self, metrics: dict[str, float]) -> float:
-        """Negative bound at its final weights, per element of xi."""
-        weights = self._weighting
-        weighted = metrics["log_p_xi"] + weights.y * metrics["log_p_y"] - weights.kl * metrics["kl"]
-        return -weighted / self._elements
+        """The same at the weights of the stage's end."""
+        return self._weighted(metrics, self._weighting.kl)
 
     @property
     def keeps_best(self) -> bool:
         """Only with early stopping: a decaying learning rate makes the last epoch the best one."""
         return math.isfinite(self.settings.patience)
 
+    def _weighted(self, terms: Mapping[str, Any], kl_weight: float) -> Any:
+        weights = self._weighting
+        bound = terms["log_p_xi"] + weights.y * terms["log_p_y"] - kl_weight * terms["kl"]
+        return -(bound + weights.from_x(terms)) / self._elements
+
 
 @final
 class PriorRefit(nn.Module):
-    """KL(q || p(.|x)) as a function of p(tau, psi|x) only."""
+    """The terms that p(tau, psi|x) appears in, as a function of it only."""
 
-    def __init__(self, model: SvaeDc) -> None:
+    def __init__(self, model: SvaeDc, weighting: Weighting) -> None:
         """Refit the prior of `model`."""
         super().__init__()
         self.network = model.prior_network
+        self.generates = weighting.generation > 0.0
+        # A function and no submodule: what it decodes with is not trained.
+        self._generation_terms = model.generation_terms
 
-    def forward(self, x: Float[Tensor, "batch controller"], q: Diagonal) -> Float[Tensor, " batch"]:
-        """KL term of each episode."""
-        return kl_divergence(q, self.network(x))
+    def forward(self, batch: Batch, q: Diagonal) -> Terms:
+        """Mean of each term over a batch whose posteriors are `q`."""
+        p = self.network(batch.x)
+        terms = {"kl": kl_divergence(q, p).mean()}
+        return terms | _from_x(self._generation_terms(p, batch.xi, batch.y)) if self.generates else terms
 
 
 @final
@@ -146,45 +174,64 @@ class PriorStage(Stage):
 
     name = "prior"
 
-    def __init__(
-        self, model: SvaeDc, training: Episodes, held_out: Episodes, settings: TrainingSettings
-    ) -> None:
-        """Refit the prior of `model` on the `training` episodes and select on the `held_out` ones."""
+    def __init__(self, model: SvaeDc, training: Episodes, settings: TrainingSettings) -> None:
+        """Refit the prior of `model` on the `training` episodes."""
         super().__init__()
-        self.module = PriorRefit(model)
+        self.module = PriorRefit(model, settings.weighting)
         self.settings = settings.prior
-        self._training = posteriors(model, training)
-        self._held_out = posteriors(model, held_out)
-        self._remember(self.held_out_loss({}))
+        self._training = training
+        self._posteriors = posteriors(model, training)
+        self._weighting = settings.weighting
+        self._frozen = [value for network in (model.decoder, model.badness) for value in _parameters(network)]
+        for value in self._frozen:
+            value.requires_grad = False
 
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
-    ) -> tuple[Float[Tensor, ""], dict[str, Float[Tensor, ""]]]:
-        """Mean KL of the batch."""
-        x, q = self._training
-        rows = torch.from_numpy(positions).to(x.device)
-        kl = wrapped(x[rows], type(q)(q.loc[rows], q.scale[rows])).mean()
-        return kl, {"kl": kl}
+    ) -> tuple[Float[Tensor, ""], Terms]:
+        """Mean KL of the batch, and what generation adds to it."""
+        ordered, q = np.sort(positions), self._posteriors
+        batch = self._training.gather(ordered, q.loc.device)
+        rows = torch.from_numpy(ordered).to(q.loc.device)
+        terms = wrapped(batch, type(q)(q.loc[rows], q.scale[rows]))
+        return self._weighted(terms), terms
 
-    @torch.no_grad()
-    def held_out_loss(self, metrics: dict[str, float]) -> float:  # noqa: ARG002 - all episodes, not a sample
-        """KL(q || p(.|x)) of all held-out episodes."""
-        self.module.eval()
-        return float(self.module(*self._held_out).mean())
+    def held_out_loss(self, metrics: dict[str, float]) -> float:
+        """The same on held-out episodes."""
+        return self._weighted(metrics)
 
     @property
     def keeps_best(self) -> bool:
         """Always: this stage overfits, and what joint training left is its first candidate."""
         return True
 
+    def finish(self) -> None:
+        """Put the best epoch's network back."""
+        super().finish()
+        for value in self._frozen:
+            value.requires_grad = True
 
-def posteriors(model: SvaeDc, episodes: Episodes) -> tuple[Float[Tensor, "episodes controller"], Diagonal]:
-    """Controllers and q(tau, psi|xi, y) of all episodes, in evaluation mode."""
+    def _weighted(self, terms: Mapping[str, Any]) -> Any:
+        weights = self._weighting
+        # Alone, the KL needs no weight, not even when it had none in stage one.
+        return weights.kl * terms["kl"] - weights.from_x(terms) if weights.generation else terms["kl"]
+
+
+def _from_x(found: tuple[Tensor, Tensor]) -> Terms:
+    return {"log_p_xi_from_x": found[0].mean(), "log_p_y_from_x": found[1].mean()}
+
+
+def _parameters(network: nn.Module | None) -> list[nn.Parameter]:
+    return [] if network is None else list(network.parameters())
+
+
+def posteriors(model: SvaeDc, episodes: Episodes) -> Diagonal:
+    """Posteriors q(tau, psi|xi, y) of all episodes, in evaluation mode."""
 
     def encoded(batch: Batch) -> dict[str, Tensor]:
         q = model.posterior(batch.xi, batch.bad, batch.y)
-        return {"x": batch.x, "loc": q.loc, "scale": q.scale}
+        return {"loc": q.loc, "scale": q.scale}
 
     model.eval()
     found = measured_over(episodes, next(model.parameters()).device, encoded)
-    return found["x"], FAMILIES[model.config.distribution](found["loc"], found["scale"])
+    return FAMILIES[model.config.distribution](found["loc"], found["scale"])

@@ -76,17 +76,17 @@ def _weighting(preset: Preset, value: str) -> Preset:
     return preset._replace(training=replace(preset.training, weighting=weighting))
 
 
-def _kl_weight(preset: Preset, value: float) -> Preset:
+def _kl_weight(preset: Preset, value: float | int) -> Preset:
     weighting = replace(preset.training.weighting, kl=float(value))
     return preset._replace(training=replace(preset.training, weighting=weighting))
 
 
-def _learning_rate(preset: Preset, value: float) -> Preset:
+def _learning_rate(preset: Preset, value: float | int) -> Preset:
     joint = replace(preset.training.joint, learning_rate=float(value))
     return preset._replace(training=replace(preset.training, joint=joint))
 
 
-def _patience(preset: Preset, value: float) -> Preset:
+def _patience(preset: Preset, value: float | int) -> Preset:
     joint = replace(preset.training.joint, patience=float(value))
     prior = replace(preset.training.prior, patience=float(value))
     return preset._replace(training=replace(preset.training, joint=joint, prior=prior))

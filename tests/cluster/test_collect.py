@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from cluster.collect import collect
@@ -280,3 +282,11 @@ def test_two_drivers_on_one_dataset_lose_and_double_nothing(ray_session, trackin
     assert list(inventory(datasets[0])) == []
     assert datasets[0].fingerprint() == alone(tmp_path / "alone", 40).fingerprint()
     assert list(unfinished.parent.iterdir()) == [unfinished]
+
+
+def test_a_rollout_process_stores_as_its_dataset_says(tmp_path):
+    identity = identity_of(setups.load("franka"), seed=0, episodes_per_shard=2, repeats=2, storage="int16")
+    dataset = create(tmp_path / "dataset", identity)
+    RolloutActor("franka", str(dataset.folder)).collect(Shard(0, 2))
+    assert not [problem for _, problems in verify(dataset) for problem in problems]
+    assert pq.read_schema(dataset.path(Shard(0, 2))).field("xi").type.value_type == pa.int16()

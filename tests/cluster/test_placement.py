@@ -2,8 +2,10 @@
 
 import pytest
 
-from cluster.errors import UserError
+from cluster.config import TrainSettings
+from cluster.errors import UsageError, UserError
 from cluster.placement import Machine, Placement, place
+from cluster.training_submission import placed
 
 
 @pytest.mark.parametrize(
@@ -44,3 +46,39 @@ def test_every_process_takes_a_gpu_where_there_are_any():
 def test_work_without_room_is_refused_instead_of_waiting_for_ever(processes, cpus, machines, message):
     with pytest.raises(UserError, match=message):
         place(processes, cpus, machines)
+
+
+def test_a_gpu_is_left_alone_when_the_cpu_is_asked_for():
+    machines = [Machine(8, gpus=1), Machine(8)]
+    assert place(2, "all", machines, "cpu") == Placement(2, 8, 0)
+
+
+def test_a_gpu_that_is_asked_for_and_absent_is_refused():
+    with pytest.raises(
+        UserError, match=r"train\.device=cuda asks for a GPU .* none free.*train\.device=auto"
+    ):
+        place(1, 1, [Machine(8)], "cuda")
+
+
+def test_an_elastic_training_needs_room_only_for_its_least_processes():
+    settings = TrainSettings(workers=8, least_workers=2, threads=3)
+    assert placed(settings, [Machine(4), Machine(4)]) == Placement(8, 3, 0, least=2)
+    with pytest.raises(UserError, match=r"needs 6 CPUs"):
+        placed(settings, [Machine(4)])
+
+
+def test_more_least_processes_than_processes_are_refused():
+    with pytest.raises(UsageError, match=r"train\.least_workers must be at most train\.workers, got 3 of 2"):
+        placed(TrainSettings(workers=2, least_workers=3), [Machine(8)])
+
+
+@pytest.mark.parametrize(
+    ("placement", "said"),
+    [
+        (Placement(1, 1, 0), "1 process of 1 CPU"),
+        (Placement(4, 2, 1), "4 processes of 2 CPUs and a GPU"),
+        (Placement(4, 2, 1, least=1), "4 processes (or as few as 1) of 2 CPUs and a GPU"),
+    ],
+)
+def test_a_placement_says_what_it_is(placement, said):
+    assert str(placement) == said

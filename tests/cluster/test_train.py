@@ -163,6 +163,7 @@ numpy.savez("answer.npz", **answer)
     np.testing.assert_allclose(answer["y"], y.detach(), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_choices_of_a_preset_can_be_changed_and_belong_to_the_model_s_origin(run_train):
     path = run_train(model="svae", distribution="gaussian", latent="5x6", balance="f", updates=3)
     model, metadata = checkpoint.load(path)

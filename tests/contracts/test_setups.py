@@ -127,7 +127,10 @@ def test_objectives_lie_within_their_limits_and_are_exact_in_float32(setup, epis
 
 def test_a_push_or_walk_the_wanted_way_is_worth_more_than_the_other_way(setup, episodes):
     """Franka pushes towards −y, the others towards +y; everything else stays as it was in the first step."""
-    y = [row for row, channel in enumerate(setup.observation) if channel.name in ("object1_y", "body_y")]
+    moved = ("object1_y", "body_y", "puck_y")
+    y = [row for row, channel in enumerate(setup.observation) if channel.name in moved]
+    if not y:
+        pytest.skip("a formula has nothing that moves")
     sign = -1.0 if setup.name.startswith("franka") else 1.0
     with setup.open() as scene:
         scene.reset(episodes[0].physics)

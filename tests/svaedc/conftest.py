@@ -41,6 +41,7 @@ def small_config():
         OBSERVATIONS,
         STEPS,
         channels=(8, 16),
+        decoder_hidden=(32,),
         rank=20,
         prior_hidden=(32, 32),
         badness_hidden=(16,),

@@ -128,7 +128,7 @@ def test_without_any_bad_step_the_correlation_is_undefined_and_no_collapse(model
         ({"active_share": 0.2}, "active_share is 0.20; lower the KL weight"),
         ({"rec_norm": 1.0}, "rec_norm is 1.00; raise the learning rate"),
         ({"gen_norm": 1.1}, "gen_norm is 1.10; collect more episodes"),
-        ({"corr_y_rec": 0.1}, "corr_y_rec is 0.10; use the `balanced` weighting"),
+        ({"corr_y_rec": 0.1}, "corr_y_rec is 0.10; raise the weight of y (weighting=balanced)"),
     ],
 )
 def test_a_collapse_is_named_with_a_remedy(change, remedy):

@@ -12,7 +12,8 @@ from svaedc.model import SvaeDc, initialised
 
 VARIANTS = [
     pytest.param(
-        {"distribution": distribution, "head": head, "prior": prior}, id=f"{distribution}-{head}-{prior}"
+        {"distribution": distribution, "head": head, "prior": prior, "trunk": prior},
+        id=f"{distribution}-{head}-{prior}",
     )
     for distribution, head, prior in product(
         ("laplace", "gaussian"), ("low-rank", "dense"), ("mlp", "deconv")
@@ -41,6 +42,18 @@ def test_the_bound_is_the_mean_of_its_sampled_four_term_form(variant, batch):
     four_terms, bound = torch.stack(sampled), torch.stack(closed)
     error = (four_terms.var(0) + bound.var(0)).sqrt() / 400**0.5
     assert ((four_terms.mean(0) - bound.mean(0)).abs() < 5.0 * error + 1e-3).all()
+
+
+def test_generation_terms_are_those_of_the_prior_s_means(variant, batch):
+    with torch.no_grad():
+        log_p_xi, log_p_y = variant.generation_terms(variant.prior(batch.x), batch.xi, batch.y)
+        generated = variant.generate(batch.x)
+        tau, psi = variant.split(variant.prior(batch.x).loc)
+        scaled = variant.normaliser.scaled(generated)
+        peak = variant.p_xi(tau).log_prob(scaled)
+    assert log_p_xi.shape == log_p_y.shape == (16,)
+    assert (log_p_xi < peak).all()
+    torch.testing.assert_close(log_p_y, variant.p_y(psi).log_prob(batch.y))
 
 
 def test_terms_have_one_number_per_episode_even_for_one_episode(variant, batch):

@@ -106,6 +106,19 @@ def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves
     assert last.metrics["held_out/best_loss"] == pytest.approx(metrics["kl"], rel=0.5)
 
 
+def test_training_for_generation_brings_generated_trajectories_closer(small_config, halves, bounds):
+    measured = {}
+    for weight in (0.0, 10.0):
+        model = initialised(small_config, halves[0], bounds, seed=0)
+        settings = replace(SHORT.with_updates(joint=120, prior=0), epoch_updates=120)
+        settings = replace(settings, weighting=Weighting(1.0, 1.0, 0.1, generation=weight))
+        [report] = trained(model, halves, settings)
+        assert ("train/log_p_xi_from_x" in report.metrics) == (weight > 0.0)
+        measured[weight] = report.metrics
+    assert measured[10.0]["held_out/gen_norm"] < measured[0.0]["held_out/gen_norm"]
+    assert measured[10.0]["held_out/log_p_xi_from_x"] > measured[0.0]["held_out/log_p_xi_from_x"]
+
+
 def test_the_second_stage_changes_only_the_prior_and_never_worsens_its_held_out_kl(model, halves):
     reports = trained(model, halves, replace(SHORT, held_out_sample=60))
     joint, final = reports[2].state["model"], model.state_dict()
