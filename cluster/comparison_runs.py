@@ -110,7 +110,7 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
     Raises:
         UserError: runs kept failing, or the disk is full; what they finished is kept.
     """
-    _silence_tune()
+    silence_tune()
     grid = tune.grid_search([{"method": key.method, "run": key.run} for key in missing])
     with tempfile.TemporaryDirectory(prefix="svaedc-tune-") as storage:
         results = Tuner(
@@ -142,7 +142,7 @@ def _failures(folder: Path, results: ResultGrid, asked: int) -> UserError:
     )
 
 
-def _silence_tune() -> None:
+def silence_tune() -> None:
     """Keeps Tune from speaking to the user, who hears of everything from us."""
     os.environ.update(_ENVIRONMENT)
     logging.getLogger("ray.tune").setLevel(logging.CRITICAL)

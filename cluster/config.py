@@ -113,8 +113,7 @@ class TrainSettings(Section):
     head: Literal["preset", "low-rank", "dense"] = "preset"
     """Output of p(xi|tau)."""
     weighting: Literal["preset", "paper", "hybrid", "balanced"] = "preset"
-    """Weights of the bound's terms: the paper's equation; with generation from x; and with a weight that keeps
-    psi alive."""
+    """Weights of the bound's terms: the paper's; with generation from x; and with more weight on y too."""
     kl_weight: NonNegativeFloat | Literal["preset"] = "preset"
     """Of the KL term; 1 is the paper's equation."""
     learning_rate: PositiveFloat | Literal["preset"] = "preset"

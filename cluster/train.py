@@ -60,9 +60,9 @@ def train(
             training collapsed.
     """
     with _refusals(model):
-        dataset = _dataset(folder)
+        dataset = trainable(folder)
         _folder(model)
-        plan = _checked(_job(dataset, model, preset, seed, settings), dataset)
+        plan = _checked(planned(dataset, model, preset, seed, settings), dataset)
         trained = _trained_updates(plan)
         summary = recorded(model, plan.updates) if trained == plan.updates else None
     if summary is not None:
@@ -92,7 +92,13 @@ def _refusals(model: Path) -> Iterator[None]:
         raise UserError(str(error)) from error
 
 
-def _dataset(folder: Path) -> Dataset:
+def trainable(folder: Path) -> Dataset:
+    """The dataset of a folder.
+
+    Raises:
+        UserError: it is too small.
+        ValueError: there is none.
+    """
     dataset = open_dataset(folder)
     if dataset.episodes() < MINIMUM_EPISODES:
         raise UserError(
@@ -111,7 +117,8 @@ def _folder(model: Path) -> None:
         ) from error
 
 
-def _job(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
+def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
+    """What the training processes get."""
     return TrainingJob(
         dataset=dataset.folder.resolve(),
         model=model.resolve(),

@@ -1,6 +1,7 @@
 """What one training process does: load, resume, run the core's loop, keep its state on disk, send word."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -20,7 +21,7 @@ from svaedc.sampling import Balanced, Order, Shard, uniform
 from svaedc.settings import TrainingSettings
 from svaedc.training import EpochReport, fit
 from svaedc.variants import varied
-from svaedc.workplace import Workplace
+from svaedc.workplace import ALONE_AT_WORK, Workplace
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
 
@@ -127,31 +128,46 @@ def run_worker(config: dict[str, Any]) -> None:
 
 def trained(job: TrainingJob, mailbox: Any) -> SvaeDc:
     """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
-    begin = time.monotonic()
     device = get_device()
     workplace = _workplace(job, device)
-    rank = workplace.shard.rank
+    tell = mailbox.put.remote
+    if workplace.shard.rank == 0:
+        tell({"device": f"{_named(device)}, {workplace.precision}"})
+    return _trained(job, workplace, device, tell, lambda update: ray.train.report({"update": update}))
+
+
+def trained_alone(job: TrainingJob) -> SvaeDc:
+    """The model, trained in this process without Ray Train; it goes on from a saved state all the same."""
+    return _trained(job, ALONE_AT_WORK, torch.device("cpu"), lambda _: None, lambda _: None)
+
+
+def _trained(
+    job: TrainingJob,
+    workplace: Workplace,
+    device: torch.device,
+    tell: Callable[[dict[str, Any]], object],
+    end_epoch: Callable[[int], object],
+) -> SvaeDc:
+    begin = time.monotonic()
+    is_first = workplace.shard.rank == 0
     cache = job.data()
     training, held_out = episodes(cache)
     settings = job.settings(cache)
     model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(device)
     state = saved_state(job)
     update = 0 if state is None else done(state, settings.training)
-    if rank == 0:
-        mailbox.put.remote({"device": f"{_named(device)}, {workplace.precision}"})
     mark, size = time.monotonic(), settings.training.batch_size
     for report in fit(model, training, held_out, settings.training, state, job.order(cache), workplace):
         late = workplace.agree(time.monotonic() - begin > job.time_limit)
-        if rank == 0:
+        if is_first:
             if late or report.is_last or report.epoch % job.checkpoint_every == 0:
                 checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
-            rate = (report.update - update) * size / (time.monotonic() - mark)
-            mailbox.put.remote(_message(report, rate))
+            tell(_message(report, (report.update - update) * size / (time.monotonic() - mark)))
         update, mark = report.update, time.monotonic()
-        ray.train.report({"update": update})
+        end_epoch(update)
         if late:
             break
-    if rank == 0:
+    if is_first:
         metadata = {**job.origin, "update": update, "versions": _versions()}
         checkpoint.save(job.model / MODEL, model, metadata)
     return model

@@ -52,8 +52,8 @@ WEIGHTINGS: Final = {
     "hybrid": Weighting(kl=1.0, y=1.0, warm_up=0.1, generation=1.0),
     "balanced": Weighting(kl=1.0, y=100.0, warm_up=0.3, generation=1.0),
 }
-"""`paper`: the paper's equation. `hybrid`: generation from x counts as much as reconstruction. `balanced`: that,
-and psi is kept alive where y drowns in the elements of xi."""
+"""`paper`: the paper's equation. `hybrid`: generation from x counts as much as reconstruction. `balanced`:
+that, and psi is kept alive where y drowns in the elements of xi."""
 
 
 @dataclass(frozen=True)

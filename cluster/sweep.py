@@ -1,0 +1,147 @@
+"""`svaedc train --sweep`: train around a preset on Ray Tune, and tell which model is better for BO."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from ray import tune
+from ray.tune import RunConfig, TuneConfig, Tuner
+
+from cluster.comparison_runs import silence_tune
+from cluster.config import TrainSettings
+from cluster.errors import UserError
+from cluster.files import replacing
+from cluster.progress import say, timed
+from cluster.session import Session
+from cluster.sweep_job import METHODS, RUNS, TRIALS, Point, run_point
+from cluster.tracking import Run, Tracker
+from cluster.train import planned, trainable
+
+TABLE: Final = "sweep.md"
+MINIMUM_EPISODES: Final = 500
+"""A tenth is held out, of which screening leaves a third for the trials of a run."""
+CHANGES: Final[Mapping[str, Mapping[str, Any]]] = {
+    "preset": {},
+    "kl-0.3": {"kl_weight": 0.3},
+    "kl-3": {"kl_weight": 3.0},
+    "rate-3e-4": {"learning_rate": 3e-4},
+    "rate-3e-3": {"learning_rate": 3e-3},
+    "dense": {"head": "dense"},
+    "stride-10": {"stride": 10},
+    "bound-alone": {"weighting": "paper"},
+}
+"""One change at a time: what matters most, a step to each side."""
+
+
+def sweep(
+    *,
+    folder: Path,
+    model: Path,
+    preset: str,
+    seed: int,
+    settings: TrainSettings,
+    session: Session,
+    tracker: Tracker,
+    changes: Mapping[str, Mapping[str, Any]] = CHANGES,
+) -> Path:
+    """Train a model for each change and rank them by a cheap proxy of what they are worth for BO.
+
+    What is finished is kept: the same command goes on with the rest.
+
+    Raises:
+        UserError: the dataset or an existing folder does not fit, or points kept failing.
+    """
+    points = _plan(folder, model, preset, seed, settings, changes)
+    missing = [point for point in points if not point.result]
+    say(f"{len(points)} models, {len(points) - len(missing)} of them trained already")
+    parameters = {"preset": preset, "seed": seed, **settings.model_dump(mode="json")}
+    with tracker.run(f"sweep {preset}", "sweep", parameters) as run:
+        if missing:
+            with timed(f"training {len(missing)} models, {session.cpus} at a time"):
+                _submit(missing, session.cpus)
+        return _record(points, model, run)
+
+
+def _plan(
+    folder: Path,
+    model: Path,
+    preset: str,
+    seed: int,
+    settings: TrainSettings,
+    changes: Mapping[str, Mapping[str, Any]],
+) -> list[Point]:
+    """Jobs whose caches exist, so that none decodes what another decodes too."""
+    points = []
+    try:
+        dataset = trainable(folder)
+        if dataset.episodes() < MINIMUM_EPISODES:
+            raise ValueError(
+                f"{folder} holds {dataset.episodes()} episodes, a sweep needs at least {MINIMUM_EPISODES}: "
+                "collect more with `svaedc collect`"
+            )
+        for name, change in changes.items():
+            varied = settings.model_copy(update={**change})
+            job = planned(dataset, model / "sweep" / name, preset, seed, varied)
+            job.settings(job.data())
+            points.append(Point(name, job))
+    except (ValueError, LookupError, OSError) as error:
+        raise UserError(f"cannot sweep: {error}") from error
+    return points
+
+
+def _submit(missing: Sequence[Point], slots: int) -> None:
+    silence_tune()
+    with tempfile.TemporaryDirectory(prefix="svaedc-tune-") as storage:
+        results = Tuner(
+            tune.with_resources(run_point, {"cpu": 1}),
+            param_space={"point": tune.grid_search(list(missing))},
+            tune_config=TuneConfig(max_concurrent_trials=slots),
+            run_config=RunConfig(name="sweep", storage_path=storage, verbose=0),
+        ).fit()
+    if results.errors:
+        reason = str(results.errors[0]).strip().splitlines()[-1]
+        raise UserError(
+            f"{len(results.errors)} of {len(missing)} models failed, the first with: {reason}. "
+            "The others are kept, and the same command tries these again"
+        )
+
+
+def _record(points: Sequence[Point], model: Path, run: Run) -> Path:
+    results = sorted((point.result for point in points), key=lambda each: -each["svae-dc"]["best"])
+    path = model / TABLE
+    with replacing(path) as unfinished:
+        unfinished.write_text("\n".join(_table(results)) + "\n")
+    for result in results:
+        with run.child(result["name"], {"point": result["name"]}) as child:
+            child.metrics(_numbers(result), step=0)
+    run.file(path)
+    say(f"{path.read_text()}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.url}")
+    return path
+
+
+def _table(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Markdown, best first."""
+    head = [
+        "model",
+        *(f"{method}: best after {TRIALS}" for method in METHODS),
+        *("svae-dc: mean", "generated", "reconstructed", "y from x", "active", "bound"),
+    ]
+    rows = [
+        (
+            each["name"],
+            *(f"{each[method]['best']:.3f}" for method in METHODS),
+            f"{each['svae-dc']['mean']:.3f}",
+            *(f"{each['metrics'][name]:.3f}" for name in ("gen_norm", "rec_norm", "corr_y_gen")),
+            *(f"{each['metrics'][name]:.0f}" for name in ("active_dimensions", "elbo")),
+        )
+        for each in results
+    ]
+    lines = [head, ["---"] * len(head), *rows]
+    note = f"Means over {RUNS} runs on recorded held-out episodes, which nothing was trained on; best first."
+    return [note, "", *("| " + " | ".join(line) + " |" for line in lines)]
+
+
+def _numbers(result: Mapping[str, Any]) -> dict[str, float]:
+    worths = {f"{method}/{name}": value for method in METHODS for name, value in result[method].items()}
+    return {**result["metrics"], **worths}
