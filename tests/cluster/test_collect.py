@@ -274,13 +274,13 @@ def test_two_drivers_on_one_dataset_lose_and_double_nothing(ray_session, trackin
     unfinished.parent.mkdir(parents=True)
     unfinished.write_bytes(b"half")
     with ThreadPoolExecutor(2) as threads:
-        drivers = [threads.submit(collected, folder, 40, ray_session, tracking_settings) for _ in range(2)]
+        drivers = [threads.submit(collected, folder, 20, ray_session, tracking_settings) for _ in range(2)]
         datasets = [driver.result() for driver in drivers]
     assert datasets[0] == datasets[1]
-    assert datasets[0].missing(40) == []
+    assert datasets[0].missing(20) == []
     assert not [problem for _, problems in verify(datasets[0]) for problem in problems]
     assert list(inventory(datasets[0])) == []
-    assert datasets[0].fingerprint() == alone(tmp_path / "alone", 40).fingerprint()
+    assert datasets[0].fingerprint() == alone(tmp_path / "alone", 20).fingerprint()
     assert list(unfinished.parent.iterdir()) == [unfinished]
 
 
