@@ -74,7 +74,7 @@ class CollectSettings(Section):
 
 CHANGEABLE = (
     *("model", "latent", "distribution", "head"),
-    *("weighting", "kl_weight", "learning_rate", "patience"),
+    *("weighting", "kl_weight", "learning_rate", "epoch_updates", "patience"),
 )
 """Settings of training that belong to the preset unless they are given."""
 
@@ -118,8 +118,10 @@ class TrainSettings(Section):
     """Of the KL term; 1 is the paper's equation."""
     learning_rate: PositiveFloat | Literal["preset"] = "preset"
     """Of the first update of the joint stage."""
+    epoch_updates: PositiveInt | Literal["preset"] = "preset"
+    """Updates between two measures on held-out episodes, an epoch here whatever the dataset's size."""
     patience: PositiveInt | Literal["preset"] = "preset"
-    """Epochs (250 updates) without a better held-out loss after which a stage ends early."""
+    """Epochs without a better held-out loss after which a stage ends early."""
 
     def changes(self) -> dict[str, str | float | int]:
         """What is changed of the preset, by name."""

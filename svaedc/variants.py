@@ -86,6 +86,10 @@ def _learning_rate(preset: Preset, value: float | int) -> Preset:
     return preset._replace(training=replace(preset.training, joint=joint))
 
 
+def _epoch_updates(preset: Preset, value: int) -> Preset:
+    return preset._replace(training=replace(preset.training, epoch_updates=value))
+
+
 def _patience(preset: Preset, value: float | int) -> Preset:
     joint = replace(preset.training.joint, patience=float(value))
     prior = replace(preset.training.prior, patience=float(value))
@@ -101,4 +105,5 @@ VARIATIONS: Final[dict[str, Callable[[Preset, Any], Preset]]] = {
     "kl_weight": _kl_weight,
     "learning_rate": _learning_rate,
     "patience": _patience,
+    "epoch_updates": _epoch_updates,
 }

@@ -20,7 +20,9 @@ from svaedc import checkpoint
 
 
 def settings(cache: Path, **changes) -> TrainSettings:
-    return TrainSettings(**{"updates": 40, "threads": 1, "cache_folder": cache, **changes})
+    return TrainSettings(
+        **{"updates": 40, "epoch_updates": 20, "threads": 1, "cache_folder": cache, **changes}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +95,7 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     assert signal.getsignal(signal.SIGINT) is before
     model, metadata = checkpoint.load(path)
     assert metadata["setup"] == "franka"
-    assert metadata["update"] == 80
+    assert metadata["update"] == 40
     assert model.latent_means(torch.rand(3, 48))[0].shape == (3, 9)
     measured = json.loads((path.parent / "metrics.json").read_text())
     assert {"rec_norm", "gen_norm", "corr_y_rec", "active_dimensions"} <= measured["metrics"].keys()
@@ -101,7 +103,7 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     client = open_tracker(tracking_settings).client
     [run] = client.search_runs(["1"])
     steps = [point.step for point in client.get_metric_history(run.info.run_id, "held_out/gen_norm")]
-    assert steps == [40, 80]
+    assert steps == [20, 40]
     assert run.inputs.dataset_inputs[0].dataset.name == "franka"
     assert {artifact.path for artifact in client.list_artifacts(run.info.run_id)} >= {"figures", "model.pt"}
     assert run.data.tags["svaedc.device"] == "cpu (1 threads), float32"
@@ -133,10 +135,10 @@ def test_two_processes_learn_what_one_does(run_train):
 
 
 def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half_way, ends):
-    assert checkpoint.load(half_way)[1]["update"] == 40
+    assert checkpoint.load(half_way)[1]["update"] == 20
     path = run_train()
-    assert checkpoint.load(path)[1]["update"] == 80
-    assert json.loads(path.with_name("metrics.json").read_text())["update"] == 80
+    assert checkpoint.load(path)[1]["update"] == 40
+    assert json.loads(path.with_name("metrics.json").read_text())["update"] == 40
     assert same(weights(path), weights(ends["finished"] / "model.pt"))
 
 
@@ -170,7 +172,7 @@ def test_the_choices_of_a_preset_can_be_changed_and_belong_to_the_model_s_origin
     assert (model.config.psi_dim, model.config.distribution, model.config.tau_size) == (0, "gaussian", 30)
     assert model.config.channels == (64, 128, 256)
     assert metadata["balance"] == "f"
-    assert metadata["changes"] == {"model": "svae", "latent": "5x6", "distribution": "gaussian"}
+    assert metadata["changes"].items() >= {"model": "svae", "latent": "5x6"}.items()
     assert not (path.parent / "badness.png").exists()
     with pytest.raises(UserError, match="was made for balance 'f', not 'none'"):
         run_train(updates=3)
@@ -184,7 +186,7 @@ def test_a_gpu_that_nobody_has_is_refused(run_train):
 @pytest.mark.slow
 def test_an_elastic_training_starts_with_the_processes_there_is_room_for(run_train, capsys):
     path = run_train(workers=64, least_workers=1)
-    assert checkpoint.load(path)[1]["update"] == 80
+    assert checkpoint.load(path)[1]["update"] == 40
     assert "64 processes (or as few as 1)" in capsys.readouterr().err
 
 
@@ -241,7 +243,7 @@ def test_other_updates_than_the_training_began_with_are_refused_naming_both(run_
 def test_a_finished_model_is_not_trained_over(run_train, finished):
     finished.with_name("training.pt").unlink()
     assert run_train() == finished
-    with pytest.raises(UserError, match="trained for 80 updates, not 100"):
+    with pytest.raises(UserError, match="trained for 40 updates, not 50"):
         run_train(updates=50)
 
 
@@ -251,7 +253,7 @@ def test_training_goes_on_in_another_tracking_store_as_a_new_run(run_train, half
     path = run_train()
     [run] = open_tracker(tracking_settings).client.search_runs(["1"])
     assert run.info.run_id == json.loads(path.with_name("run.json").read_text())["run"] != before
-    assert checkpoint.load(path)[1]["update"] == 80
+    assert checkpoint.load(path)[1]["update"] == 40
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def test_a_dataset_that_grew_since_the_plan_ends_training_at_the_first_try(track
     planned = replace(job, origin={**job.origin, "dataset": "0" * 64})
     with (
         open_tracker(tracking_settings).run("train", "train", {}) as run,
-        ProgressLine("updates", 80, 0) as progress,
+        ProgressLine("updates", 40, 0) as progress,
         pytest.raises(UserError, match=r"has changed since this training was planned: .* was 000000000000"),
     ):
         submit(planned, Placement(1, 1, 0), progress, run)

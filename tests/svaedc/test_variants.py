@@ -17,6 +17,7 @@ CHANGES = {
     "kl_weight": 5.0,
     "learning_rate": 3e-4,
     "patience": 4,
+    "epoch_updates": 100,
 }
 """A value of each that no preset has."""
 
