@@ -21,7 +21,7 @@ PAIRS: Final = 8
 ones would make k(x, x) differ from 1."""
 STEPS: Final = 10
 """Evenly spaced steps of a trajectory that BBK-KL compares: neighbouring ones repeat each other, and alpha
-absorbs a common factor of D. Over pairs of controllers, D of 10 correlates .9999 with D of all 100."""
+absorbs the common factor that D loses."""
 BLOCK: Final = 250
 """Controllers decoded at once, so that memory does not grow with the pool."""
 _LEAST_VARIANCE: Final = 1e-12

@@ -20,8 +20,10 @@ from svaedc.history import History
 RESTARTS: Final = 5
 RAW_SAMPLES: Final = 256
 """Points that `optimize_acqf` draws, to start from the most promising ones."""
-ITERATIONS: Final = 50
+ITERATIONS: Final = 200
 """Of L-BFGS from each of them."""
+BLOCK: Final = 1_000
+"""Candidates whose values are computed at once: intermediate results stay in the processor's caches."""
 DRAWS: Final = 64
 """Random controllers from which the first allowed one is taken."""
 _PENALTY: Final = 1e3
@@ -67,8 +69,9 @@ class OverPool:
     ) -> Float32[np.ndarray, " D"]:
         """The untried candidate of largest value."""
         untried = candidates.untried(history)
+        cuts = range(BLOCK, len(untried), BLOCK)
         with torch.no_grad():
-            best = value(candidates.phi[untried]).argmax()
+            best = torch.cat([value(candidates.phi[block]) for block in np.split(untried, cuts)]).argmax()
         return candidates.x[untried[best]].copy()
 
 

@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from cluster.collect import collect
@@ -266,17 +268,28 @@ def test_an_mlflow_store_that_fails_meanwhile_does_not_end_the_collection(tracki
 
 
 def test_two_drivers_on_one_dataset_lose_and_double_nothing(ray_session, tracking_settings, tmp_path):
-    """And what a living process is writing meanwhile stays."""
+    """And what a living process is writing meanwhile stays.
+
+    The drivers are threads of one process, which begins the dataset once: its unfinished files bear one name.
+    """
     folder = tmp_path / "dataset"
+    create(folder, identity_of(setups.load("franka"), seed=3, episodes_per_shard=8))
     unfinished = folder / WRITING / f"{Shard(96, 104).name}.{writer()}"
-    unfinished.parent.mkdir(parents=True)
     unfinished.write_bytes(b"half")
     with ThreadPoolExecutor(2) as threads:
-        drivers = [threads.submit(collected, folder, 40, ray_session, tracking_settings) for _ in range(2)]
+        drivers = [threads.submit(collected, folder, 20, ray_session, tracking_settings) for _ in range(2)]
         datasets = [driver.result() for driver in drivers]
     assert datasets[0] == datasets[1]
-    assert datasets[0].missing(40) == []
+    assert datasets[0].missing(20) == []
     assert not [problem for _, problems in verify(datasets[0]) for problem in problems]
     assert list(inventory(datasets[0])) == []
-    assert datasets[0].fingerprint() == alone(tmp_path / "alone", 40).fingerprint()
+    assert datasets[0].fingerprint() == alone(tmp_path / "alone", 20).fingerprint()
     assert list(unfinished.parent.iterdir()) == [unfinished]
+
+
+def test_a_rollout_process_stores_as_its_dataset_says(tmp_path):
+    identity = identity_of(setups.load("franka"), seed=0, episodes_per_shard=2, repeats=2, storage="int16")
+    dataset = create(tmp_path / "dataset", identity)
+    RolloutActor("franka", str(dataset.folder)).collect(Shard(0, 2))
+    assert not [problem for _, problems in verify(dataset) for problem in problems]
+    assert pq.read_schema(dataset.path(Shard(0, 2))).field("xi").type.value_type == pa.int16()

@@ -1,10 +1,29 @@
 """The rates of machines are those of the last minutes."""
 
+import math
 import time
 
 import pytest
 
 from cluster.rates import Rates
+from cluster.tally import Tally
+from workers.collection import ShardReport
+from workers.dataset.shards import Shard
+
+
+def report(machine: str, shard: Shard) -> ShardReport:
+    return ShardReport(
+        shard=shard,
+        badness=0.25,
+        diverged=0,
+        stopped=0,
+        best=0.0,
+        size=1000,
+        rollout_seconds=1.0,
+        storage_seconds=0.1,
+        seconds=1.2,
+        machine=machine,
+    )
 
 
 def test_rates_count_the_episodes_of_each_machine():
@@ -35,3 +54,15 @@ def test_one_machine_is_not_named_and_many_are_not_listed():
         rates.add(f"m{number}", 20 + 20 * number)
     assert rates.note().startswith(", 6 machines from m0 ")
     assert " to m5 " in rates.note()
+
+
+def test_a_tally_tells_mlflow_the_time_left_and_the_rate_of_every_machine():
+    tally = Tally(planned=40, begin=time.monotonic() - 10.0, rates=Rates(begin=time.monotonic() - 10.0))
+    assert math.isnan(tally.metrics()["seconds_left"])
+    tally.add(report("one", Shard(0, 8)))
+    tally.add(report("two", Shard(8, 10)))
+    metrics = tally.metrics()
+    assert metrics["seconds_left"] == pytest.approx(30.0, rel=0.2)
+    assert metrics["machine/one/episodes_per_second"] == pytest.approx(0.8, rel=0.2)
+    assert metrics["machine/two/episodes_per_second"] == pytest.approx(0.2, rel=0.2)
+    assert tally.note().startswith("bad 0.25, one 0.")

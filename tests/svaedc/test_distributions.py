@@ -40,6 +40,16 @@ def test_log_prob_is_the_sum_over_the_event_of_torchs(family):
 
 
 @families
+def test_quantile_is_that_of_torch_row_by_row(family):
+    q, _ = random_pair(family)
+    u = torch.tensor([[0.01, 0.25, 0.5], [0.6, 0.9, 0.999]], dtype=torch.float64)
+    expected = torch.stack(
+        [TORCH[family](loc, scale).icdf(u) for loc, scale in zip(q.loc, q.scale, strict=True)]
+    )
+    torch.testing.assert_close(q.quantile(u), expected)
+
+
+@families
 def test_log_prob_of_another_shape_is_refused_instead_of_broadcast(family):
     q, _ = random_pair(family)
     with pytest.raises(ValueError, match=r"shape \(7, 2, 3\), got \(7, 2\)"):

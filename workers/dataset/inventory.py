@@ -24,16 +24,16 @@ def inventory(dataset: Dataset) -> Iterator[Problem]:
 
 
 def lost(dataset: Dataset) -> list[Shard]:
-    """Shards of which only the digest is there, and whose episodes are nowhere else.
+    """Shards of which only the digest is there, and whose episodes are not all in other files.
 
     They were deleted, or their writer was killed between the two names.
     """
-    return [shard for shard in _digests_alone(dataset) if not _is_covered(dataset, shard)]
+    return [shard for shard, is_covered in _digests_alone(dataset) if not is_covered]
 
 
 def left_over(dataset: Dataset) -> list[Shard]:
     """Shards of which only the digest is there, while other files hold their episodes."""
-    return [shard for shard in _digests_alone(dataset) if _is_covered(dataset, shard)]
+    return [shard for shard, is_covered in _digests_alone(dataset) if is_covered]
 
 
 def sweep_digests(dataset: Dataset) -> int:
@@ -64,13 +64,16 @@ def _whose(dataset: Dataset, path: Path) -> str:
     return "and its bytes are those of no shard here"
 
 
-def _digests_alone(dataset: Dataset) -> Iterator[Shard]:
-    for path in sorted(dataset.folder.glob(f"*.parquet{_DIGEST}")):
-        for shard in named(path.name.removesuffix(_DIGEST)):
-            if not dataset.path(shard).exists():
-                yield shard
-
-
-def _is_covered(dataset: Dataset, shard: Shard) -> bool:
-    missing = dataset.missing(shard.stop)
-    return not any(shard.start < other.stop and other.start < shard.stop for other in missing)
+def _digests_alone(dataset: Dataset) -> list[tuple[Shard, bool]]:
+    """Shards without a file, and whether other files hold all of their episodes."""
+    alone = [
+        shard
+        for path in sorted(dataset.folder.glob(f"*.parquet{_DIGEST}"))
+        for shard in named(path.name.removesuffix(_DIGEST))
+        if not dataset.path(shard).exists()
+    ]
+    uncovered = dataset.missing(max((shard.stop for shard in alone), default=0))
+    return [
+        (shard, not any(shard.start < gap.stop and gap.start < shard.stop for gap in uncovered))
+        for shard in alone
+    ]
