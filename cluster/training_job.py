@@ -130,10 +130,9 @@ def trained(job: TrainingJob, mailbox: Any) -> SvaeDc:
     """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
     device = get_device()
     workplace = _workplace(job, device)
-    tell = mailbox.put.remote
-    if workplace.shard.rank == 0:
-        tell({"device": f"{_named(device)}, {workplace.precision}"})
-    return _trained(job, workplace, device, tell, lambda update: ray.train.report({"update": update}))
+    return _trained(
+        job, workplace, device, mailbox.put.remote, lambda update: ray.train.report({"update": update})
+    )
 
 
 def trained_alone(job: TrainingJob) -> SvaeDc:
@@ -156,6 +155,8 @@ def _trained(
     model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(device)
     state = saved_state(job)
     update = 0 if state is None else done(state, settings.training)
+    if is_first:
+        tell({"device": f"{_named(device)}, {workplace.precision}"})
     mark, size = time.monotonic(), settings.training.batch_size
     for report in fit(model, training, held_out, settings.training, state, job.order(cache), workplace):
         late = workplace.agree(time.monotonic() - begin > job.time_limit)
