@@ -1,4 +1,4 @@
-"""SIGTERM as an ordinary way to end: what was begun is cleaned up."""
+"""SIGTERM and Ctrl-C as ordinary ways to end: what was begun is cleaned up."""
 
 import signal
 import threading
@@ -9,7 +9,7 @@ from types import FrameType
 
 @contextmanager
 def terminating_as_exit() -> Iterator[None]:
-    """Lets SIGTERM (`ray job stop`, a service manager) unwind the stack inside the block.
+    """Lets SIGTERM (`ray job stop`, a service manager) and Ctrl-C unwind the stack inside the block.
 
     Enter it after `ray.init`, which replaces the handlers set before it. In a thread, which may not set
     handlers, it does nothing.
@@ -21,6 +21,9 @@ def terminating_as_exit() -> Iterator[None]:
     def leave(_number: int, _frame: FrameType | None) -> None:
         raise SystemExit(128 + signal.SIGTERM)
 
+    # A compiled library may have put a handler of its own beneath Python's, which then never runs: MLflow
+    # imports Polars where it is installed, and that swallows Ctrl-C. Setting Python's again takes it back.
+    signal.signal(signal.SIGINT, signal.getsignal(signal.SIGINT) or signal.default_int_handler)
     previous = signal.signal(signal.SIGTERM, leave)
     try:
         yield
