@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import signal
 import socket
 from pathlib import Path
 
@@ -14,6 +15,9 @@ settings.register_profile("untimed", deadline=None, suppress_health_check=[Healt
 settings.register_profile("repeatable", settings.get_profile("untimed"), derandomize=True)
 settings.register_profile("exploring", settings.get_profile("untimed"), max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
+
+# A shell starts what it puts into the background with Ctrl-C ignored, and children inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Nothing in a test reports home, and every process has one thread: tests share few cores.
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
