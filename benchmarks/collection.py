@@ -8,6 +8,7 @@ import os
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -19,6 +20,7 @@ from cluster.tracking import open_tracker
 from workers import setups
 
 SAMPLE_SECONDS = 4.0  # sampling costs CPU time of its own
+ACTOR_SECONDS = 0.1  # reading those two processes is cheap, and what they did after the last reading is lost
 
 
 class Meter:
@@ -37,15 +39,24 @@ class Meter:
     def sample(self) -> dict[int, float]:
         """CPU seconds of every process seen so far; those that ended keep their last."""
         for process in [self.driver, *self.driver.children(recursive=True)]:
-            try:
-                times = process.cpu_times()
-                self.cpu[process.pid] = times.user + times.system
-            except psutil.NoSuchProcess:
-                continue
+            self.read(process)
         return dict(self.cpu)
 
+    def read(self, process: psutil.Process) -> None:
+        """CPU seconds of one process, unless it has ended."""
+        with suppress(psutil.NoSuchProcess):
+            times = process.cpu_times()
+            self.cpu[process.pid] = times.user + times.system
+
     def _watch(self):
-        while not self._ended.wait(SAMPLE_SECONDS):
+        due = time.monotonic()
+        while not self._ended.wait(ACTOR_SECONDS):
+            for pid in self.actor_pss:
+                with suppress(psutil.NoSuchProcess):
+                    self.read(psutil.Process(pid))
+            if time.monotonic() < due:
+                continue
+            due = time.monotonic() + SAMPLE_SECONDS
             self.sample()
             self.driver_rss.append(self.driver.memory_info().rss)
             for process in self.driver.children(recursive=True):
