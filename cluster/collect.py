@@ -127,8 +127,8 @@ def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
     say(
         f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
         f"{tally.episodes} new in {duration(tally.seconds)} "
-        f"({tally.episodes / max(tally.seconds, 1e-9):.1f}/s, {tally.core_seconds / 3600:.2f} core-hours), "
-        f"mean badness {tally.bad / max(tally.episodes, 1):.2f}, {tally.diverged} diverged, "
+        f"({tally.rate:.1f}/s, {tally.core_seconds / 3600:.2f} core-hours), "
+        f"mean badness {tally.badness:.2f}, {tally.diverged} diverged, "
         f"{tally.stopped} stopped, {tally.retries} retries; {run.url}"
     )
     run.metrics(tally.metrics() | review(dataset), step=tally.episodes)

@@ -1,15 +1,13 @@
-"""The settings: typed sections, read from `metadata.svaedc` of a Ray cluster file and from `--set`.
+"""The settings: typed sections.
 
 Every default is here and nowhere else; a driver receives only its own section. Importing this module loads
 neither Ray nor torch.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Literal
 
-import yaml
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -18,13 +16,7 @@ from pydantic import (
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
-    ValidationError,
 )
-
-from cluster.errors import UsageError, nearest
-
-DEFAULT_FILE = Path("ray_config.yaml")
-"""Read from the working directory when no `--config` is given and it exists."""
 
 UserPath = Annotated[Path, AfterValidator(Path.expanduser)]
 """A path in which a leading `~` stands for the user's home."""
@@ -166,85 +158,3 @@ class Settings(Section):
     compare: CompareSettings = CompareSettings()
     hardware: HardwareSettings = HardwareSettings()
     tracking: TrackingSettings = TrackingSettings()
-
-
-def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
-    """Reads the settings of one command.
-
-    Args:
-        path: the file given with `--config`, which must exist; without one, `ray_config.yaml` of the working
-            directory is read if it is there.
-        overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the
-            value is a YAML scalar.
-
-    Raises:
-        UsageError: the file is absent or unreadable, a key is unknown, or a value is out of its range.
-    """
-    sections = _sections(path if path is not None else DEFAULT_FILE) if path or DEFAULT_FILE.exists() else {}
-    for override in overrides:
-        _apply(override, sections)
-    try:
-        return Settings.model_validate(sections)
-    except ValidationError as error:
-        origin = f"{path or DEFAULT_FILE} or --set" if overrides else f"{path or DEFAULT_FILE}"
-        raise UsageError(f"{origin}: " + "; ".join(_complaints(error))) from error
-
-
-def _sections(path: Path) -> dict[str, Any]:
-    """The content of `metadata.svaedc`; a section in which everything is commented out reads as empty."""
-    try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(
-            f"cannot read the settings file {path}: {error.strerror}; give an existing file to --config"
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} is not YAML: {error}") from error
-    metadata = _mapping(document, path, "the file").get("metadata")
-    own = _mapping(_mapping(metadata, path, "metadata").get("svaedc"), path, "metadata.svaedc")
-    return {name: dict(_mapping(keys, path, f"metadata.svaedc.{name}")) for name, keys in own.items()}
-
-
-def _mapping(value: object, path: Path, place: str) -> Mapping[str, Any]:
-    if value is None:
-        return {}
-    if not isinstance(value, dict):
-        raise UsageError(f"{path}: {place} must be a mapping of names to values, got {value!r}")
-    return value
-
-
-def _apply(override: str, sections: dict[str, Any]) -> None:
-    """Writes one `section.key=value` into the sections."""
-    name, equals, text = override.partition("=")
-    section, dot, key = name.strip().partition(".")
-    if not (equals and dot and section and key):
-        raise UsageError(f"--set takes section.key=value, such as train.workers=2, got {override!r}")
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise UsageError(f"--set {name}: {text!r} is not a YAML value") from error
-    sections.setdefault(section, {})[key] = value
-
-
-def _complaints(error: ValidationError) -> Iterator[str]:
-    """One sentence per bad key, naming it; a choice such as `number or all` is reported once."""
-    seen = set()
-    for detail in error.errors(include_url=False):
-        place = tuple(str(part) for part in detail["loc"][:2])
-        name = ".".join(place)
-        if name in seen:
-            continue
-        seen.add(name)
-        if detail["type"] == "extra_forbidden":
-            yield f"unknown setting {name!r}, {nearest(name, _known(place))}"
-        else:
-            yield f"{name}: {detail['msg'][0].lower()}{detail['msg'][1:]}, got {detail['input']!r}"
-
-
-def _known(place: Sequence[str]) -> list[str]:
-    """The full names that could have stood where this unknown one stands."""
-    sections = get_type_hints(Settings)
-    names = [
-        f"{section}.{key}" for section in Settings.model_fields for key in sections[section].model_fields
-    ]
-    return names if len(place) > 1 else list(Settings.model_fields)

@@ -35,12 +35,7 @@ def exhibit(wanted: str, setup: Setup, seed: int | None) -> Episode:
         recorded = _recorded(wanted, rest, setup)
         return recorded if seed is None else _performed(setup, recorded.x, drawn(setup, seed))
     x = _random(wanted, rest, setup) if kind == "random" else _given(wanted, setup)
-    return _performed(setup, x, nominal(setup) if seed is None else drawn(setup, seed))
-
-
-def nominal(setup: Setup) -> Physics:
-    """The middle of every range that data are collected under."""
-    return {name: (low + high) / 2 for name, (low, high) in setup.physics.intervals.items()}
+    return _performed(setup, x, setup.physics.middle() if seed is None else drawn(setup, seed))
 
 
 def drawn(setup: Setup, seed: int) -> Physics:
@@ -92,7 +87,9 @@ def _recorded(wanted: str, rest: str, setup: Setup) -> Episode:
     try:
         dataset = open_dataset(Path(folder).expanduser())
         _require_same(dataset, setup)
-        return _episode(dataset, index)
+        return dataset.episode(index)
+    except IndexError as error:
+        raise UsageError(str(error)) from error
     except ValueError as error:
         raise UserError(str(error)) from error
 
@@ -114,20 +111,3 @@ def _require_same(dataset: Dataset, setup: Setup) -> None:
             f"{dataset.folder} was collected when {setup.name} had other channels or conditions; "
             "collect it anew"
         )
-
-
-def _episode(dataset: Dataset, index: int) -> Episode:
-    shard = next((shard for shard in dataset.shards() if shard.start <= index < shard.stop), None)
-    if shard is None:
-        held = ", ".join(f"{shard.start} to {shard.stop - 1}" for shard in dataset.shards()[:4]) or "none"
-        raise UsageError(f"{dataset.folder} holds no episode {index}; its files hold {held}")
-    columns, row = dataset.read(shard), index - shard.start
-    return Episode(
-        x=columns.x[row],
-        xi=columns.xi[row],
-        bad=columns.bad[row],
-        y=float(columns.y[row]),
-        f=float(columns.f[row]),
-        stop=columns.stop[row],
-        physics={name: float(values[row]) for name, values in columns.physics.items()},
-    )

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from cluster.config import Settings, load_settings
+from cluster.config import Settings
 from cluster.errors import UsageError, UserError
 from cluster.progress import say
+from cluster.settings_file import load_settings
 from workers import setups
 from workers.setups import Setup
 from workers.tasks.own_bad import with_bad

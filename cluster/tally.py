@@ -55,18 +55,28 @@ class Tally:
         """CPU time of the rollout processes in rollouts and storage."""
         return self.rollout_seconds + self.storage_seconds
 
+    @property
+    def badness(self) -> float:
+        """Mean y."""
+        return self.bad / max(self.episodes, 1)
+
+    @property
+    def rate(self) -> float:
+        """Episodes per second."""
+        return self.episodes / max(self.seconds, 1e-9)
+
     def note(self) -> str:
         """What a person wants to know beside counts and rate."""
-        return f"bad {self.bad / max(self.episodes, 1):.2f}{self.rates.note()}"
+        return f"bad {self.badness:.2f}{self.rates.note()}"
 
     def metrics(self) -> dict[str, float]:
         """The tally as numbers for MLflow, by name."""
-        rate = self.episodes / max(self.seconds, 1e-9)
+        rate = self.rate
         values = {
             "episodes": self.episodes,
             "episodes_per_second": rate,
             "seconds_left": (self.planned - self.episodes) / rate if rate and self.planned else math.nan,
-            "badness": self.bad / max(self.episodes, 1),
+            "badness": self.badness,
             "best_objective": self.best,
             "diverged": self.diverged,
             "stopped": self.stopped,

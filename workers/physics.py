@@ -33,6 +33,10 @@ class PhysicsRanges:
         """As `ranges` reads it, in the order of the names: equal texts for equal ranges."""
         return ",".join(f"{name}={low}:{high}" for name, (low, high) in sorted(self.intervals.items()))
 
+    def middle(self) -> dict[str, float]:
+        """The nominal value of every parameter: the middle of its interval."""
+        return {name: (low + high) / 2 for name, (low, high) in self.intervals.items()}
+
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """One value per parameter, uniform in its interval, drawn in the order of the names."""
         return {name: float(rng.uniform(low, high)) for name, (low, high) in sorted(self.intervals.items())}

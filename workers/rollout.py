@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Float32, UInt8
 
 from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed
@@ -170,9 +170,11 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     return int(insane[0]) if insane.size else xi.shape[1]
 
 
-def degrees(bad: Stored) -> Bool[np.ndarray, " time"] | Float32[np.ndarray, " time"]:
-    """How bad each step is: the degree itself, or whether any bit is set."""
-    return bad if bad.dtype == np.float32 else bad != 0
+def degrees(
+    bad: UInt8[np.ndarray, "*episodes time"] | Float32[np.ndarray, "*episodes time"],
+) -> Float32[np.ndarray, "*episodes time"]:
+    """How bad each step is: the degree itself, or 1 where any bit is set."""
+    return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
 
 
 def _stored(is_bad: Bad) -> Stored:

@@ -94,7 +94,7 @@ class Setup:
         """
         if "=" not in level:
             return self.gaps[known(level, "gap level", self.gaps)]
-        fixed = {name: ((low + high) / 2,) * 2 for name, (low, high) in self.physics.intervals.items()}
+        fixed = {name: (value, value) for name, value in self.physics.middle().items()}
         written = ranges(level).intervals
         for name in written:
             known(name, "physics parameter", fixed)

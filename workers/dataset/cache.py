@@ -14,8 +14,8 @@ from jaxtyping import Float32, Int64
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
-from workers.dataset.schema import Columns, degree
-from workers.rollout import DIVERGED
+from workers.dataset.schema import Columns
+from workers.rollout import DIVERGED, degrees
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
@@ -166,7 +166,7 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
         "episode": columns.episode[sane],
         "x": columns.x[sane],
         "xi": columns.xi[sane][:, :, last],
-        "bad": degree(columns.bad[sane][:, last]),
+        "bad": degrees(columns.bad[sane][:, last]),
         "y": columns.y[sane],
         "f": columns.f[sane],
     }

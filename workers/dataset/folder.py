@@ -12,7 +12,7 @@ from workers.dataset.identity import Identity
 from workers.dataset.publication import link, synchronise, temporary_file
 from workers.dataset.schema import Columns, read, read_stops
 from workers.dataset.shards import Shard
-from workers.rollout import DIVERGED
+from workers.rollout import DIVERGED, Episode
 
 MANIFEST = "dataset.json"
 
@@ -64,6 +64,19 @@ class Dataset:
     def read(self, shard: Shard) -> Columns:
         """The episodes of a shard; a damaged file raises `ValueError`."""
         return read(self.path(shard), self.identity)
+
+    def episode(self, index: int) -> Episode:
+        """One episode, as it was recorded.
+
+        Raises:
+            IndexError: no finished shard holds it; the message names some that there are.
+            ValueError: the file that holds it is damaged.
+        """
+        shard = next((shard for shard in self.shards() if shard.start <= index < shard.stop), None)
+        if shard is None:
+            held = ", ".join(f"{each.start} to {each.stop - 1}" for each in self.shards()[:4]) or "none"
+            raise IndexError(f"{self.folder} holds no episode {index}; its files hold {held}")
+        return self.read(shard).row(index - shard.start)
 
     def fingerprint(self) -> str:
         """SHA-256 over the identity and the recorded digest of every shard: the same for the same bytes."""

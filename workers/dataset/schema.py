@@ -68,6 +68,18 @@ class Columns:
     stop: tuple[str, ...]
     physics: Mapping[str, Float64[np.ndarray, " n"]]
 
+    def row(self, number: int) -> Episode:
+        """The episode at a place in the file, counted from 0."""
+        return Episode(
+            x=self.x[number],
+            xi=self.xi[number],
+            bad=self.bad[number],
+            y=float(self.y[number]),
+            f=float(self.f[number]),
+            stop=self.stop[number],
+            physics={name: float(values[number]) for name, values in self.physics.items()},
+        )
+
 
 def schema(identity: Identity) -> pa.Schema:
     """Columns and metadata of every file of a dataset."""
@@ -129,11 +141,6 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         write_page_checksum=True,
         **_encodings(identity),
     )
-
-
-def degree(bad: Bad) -> Float32[np.ndarray, "n time"]:
-    """How bad each step is: the degree itself, or 1 where any bit is set."""
-    return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
 
 
 def _is_graded(identity: Identity) -> bool:

@@ -9,11 +9,11 @@ import numpy as np
 from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
-from workers.dataset.schema import Columns, degree, read_identity
+from workers.dataset.schema import Columns, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
-from workers.rollout import DIVERGED
+from workers.rollout import DIVERGED, degrees
 from workers.tasks.stop import STOPPED
 
 
@@ -111,9 +111,9 @@ def _stop_problems(columns: Columns, identity: Identity) -> Iterator[str]:
 def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     if not all(np.isfinite(values).all() for values in (columns.x, columns.xi, columns.y, columns.f)):
         yield "it holds numbers that are not finite"
-    if not np.all((degree(columns.bad) >= 0.0) & (degree(columns.bad) <= 1.0)):
+    if not np.all((degrees(columns.bad) >= 0.0) & (degrees(columns.bad) <= 1.0)):
         yield "it holds degrees of badness outside [0, 1]"
-    if not np.allclose(columns.y, degree(columns.bad).mean(axis=1, dtype=np.float64), atol=1e-6):
+    if not np.allclose(columns.y, degrees(columns.bad).mean(axis=1, dtype=np.float64), atol=1e-6):
         yield "y is not the mean of the bad steps"
     yield from _stop_problems(columns, identity)
     drawn = columns.episode // identity.repeats

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from types import TracebackType
 
 import numpy as np
 import pybullet_data
@@ -12,6 +11,7 @@ from jaxtyping import UInt8, UInt16
 
 from workers.simulation.bullet import pybullet
 from workers.simulation.scenery import Camera
+from workers.simulation.server import Server
 from workers.simulation.shapes import Surface
 
 _BASE = -1
@@ -30,26 +30,12 @@ _LIGHT = {
 _SKY = np.array([[196, 212, 228], [240, 244, 247]])  # red, green, blue at the top and the bottom
 
 
-class Stage:
+class Stage(Server):
     """A PyBullet server with visual shapes; it draws in memory and needs no screen."""
 
     def __init__(self) -> None:
-        self.client: int = pybullet.connect(pybullet.DIRECT)
+        super().__init__()
         self._joints: dict[int, list[int]] = {}
-
-    def __enter__(self) -> "Stage":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the server; closing twice is harmless."""
-        if self.client >= 0:
-            pybullet.disconnect(physicsClientId=self.client)
-            self.client = -1
 
     def add_machine(self, urdf: Path | str, joints: Sequence[str]) -> int:
         """Load a robot with its visual shapes; returns its body.

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from types import TracebackType
 
 from workers.simulation.bullet import pybullet
+from workers.simulation.server import Server
 
 GRAVITY = -9.81  # m/s²
 _STATIC = (2, -3)  # Bullet's own collision group and mask of fixed bases
@@ -12,7 +12,7 @@ _DYNAMIC = (1, -1)  # and of everything else
 _NOTHING = (0, 0)
 
 
-class World:
+class World(Server):
     """A physics server of this process, with a ground plane at z = 0.
 
     Contacts take the product of the two bodies' friction and restitution; the plane has 1.0 of both, so that
@@ -24,7 +24,7 @@ class World:
     """
 
     def __init__(self, *, time_step: float, solver_iterations: int) -> None:
-        self.client: int = pybullet.connect(pybullet.DIRECT)
+        super().__init__()
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step,
             numSolverIterations=solver_iterations,
@@ -40,20 +40,6 @@ class World:
         )
         self._intangible: set[tuple[int, int]] = set()
         self._filters: dict[tuple[int, int], tuple[int, int]] = {}
-
-    def __enter__(self) -> "World":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the physics server; closing twice is harmless."""
-        if self.client >= 0:
-            pybullet.disconnect(physicsClientId=self.client)
-            self.client = -1
 
     def step(self) -> None:
         """Advance by one time step."""
