@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cluster.collection_work import planned, rollout_pool, work
+from cluster.collection_work import growth, planned, rollout_pool, work
 from cluster.config import CollectSettings
 from cluster.errors import UserError
 from cluster.forecasts import begin, described, metrics, review, spent
@@ -51,10 +51,11 @@ def collect(
     parameters = _parameters(identity, episodes, actors, settings)
     with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
         tally = Tally(planned=_size(plan))
+        pool = rollout_pool(dataset, settings, actors, actor, growth(settings))
         try:
-            work(dataset, plan, episodes, tally, run, rollout_pool(dataset, settings, actors, actor))
+            work(dataset, plan, episodes, tally, run, pool)
         finally:
-            spent(dataset, tally, actors)
+            spent(dataset, tally, pool.actor_seconds)
         _record(dataset, episodes, tally, run)
     return dataset
 

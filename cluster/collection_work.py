@@ -3,6 +3,7 @@
 import errno
 from collections import deque
 from collections.abc import Iterable
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -54,10 +55,19 @@ def planned(identity: Identity, episodes: int, folder: Path) -> tuple[Dataset, l
     return dataset, dataset.missing(episodes)
 
 
+def growth(settings: CollectSettings) -> float:
+    """How many actors there may be as CPUs become free: as many as are asked for."""
+    return inf if settings.actors == "all" else settings.actors
+
+
 def rollout_pool(
-    dataset: Dataset, settings: CollectSettings, actors: int, actor: type[RolloutActor] = RolloutActor
+    dataset: Dataset,
+    settings: CollectSettings,
+    actors: int,
+    actor: type[RolloutActor] = RolloutActor,
+    most: float = 0,
 ) -> Pool[Shard, ShardReport]:
-    """Actors that roll out shards of a dataset, one CPU each."""
+    """Actors that roll out shards of a dataset, one CPU each; as many more as become free, up to `most`."""
     remote: Any = ray.remote(actor)
     options = remote.options(num_cpus=1, max_restarts=0, max_task_retries=0)
     return Pool(
@@ -69,6 +79,7 @@ def rollout_pool(
             attempts=settings.attempts_per_shard,
             seconds=settings.shard_timeout_seconds,
         ),
+        most=most,
     )
 
 

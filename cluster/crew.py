@@ -1,4 +1,7 @@
-"""A crew of Ray actors: each gets work only after its first answer, and is replaced when it is lost."""
+"""A crew of Ray actors: each gets work only after its first answer, and is replaced when it is lost.
+
+It may grow with the cluster: a place is added for a CPU that becomes free, and closed when its machine leaves.
+"""
 
 import re
 import time
@@ -10,9 +13,12 @@ import ray
 from ray.exceptions import RayActorError, RayError, RayTaskError
 
 from cluster.errors import UserError
+from cluster.machines import free_cpus, is_there, machine_of, own_machine
 from cluster.progress import say
 
 _RETRY_SECONDS = 2.0
+_LONGEST_RETRY_SECONDS = 60.0
+_LOOK_SECONDS = 5.0
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 Item = TypeVar("Item")
@@ -25,7 +31,9 @@ class Member(Generic[Item]):
     Attributes:
         actor: the actor's handle; None between a failed start and the next.
         starting: reference of its first answer; None once it is there.
-        is_replacement: whether an actor was lost from this place.
+        machine: id of the machine on which the actor answered.
+        is_late: whether an actor was lost from this place, or the place was added later.
+        failures: starts that failed since the last one that did not.
         due: earliest time of the next start, if the actor is None.
         tasks: its work: reference of the result -> item, oldest first.
         since: when the oldest of them began.
@@ -33,7 +41,9 @@ class Member(Generic[Item]):
 
     actor: Any = None
     starting: Any = None
-    is_replacement: bool = False
+    machine: str = ""
+    is_late: bool = False
+    failures: int = 0
     due: float = 0.0
     tasks: dict[Any, Item] = field(default_factory=dict)
     since: float = 0.0
@@ -49,25 +59,45 @@ class Crew(Generic[Item]):
 
     Args:
         spawn: starts one actor, which has a method `ready`, and returns its handle.
-        size: how many actors.
+        size: how many actors there are at first.
+        most: how many there may be; with more than `size`, places come and go with the cluster's CPUs.
         patience: seconds that may pass without a single actor that is ready.
+
+    Attributes:
+        members: the places.
+        answers: the first answer of every actor there ever was.
+        seconds: that all places together have existed, in seconds.
     """
 
-    def __init__(self, *, spawn: Callable[[], Any], size: int, patience: float) -> None:
+    def __init__(self, *, spawn: Callable[[], Any], size: int, most: float, patience: float) -> None:
         self._spawn = spawn
+        self._most = most
+        self._grows = most > size
         self._patience = patience
-        self._manned = time.monotonic()  # when an actor was last seen ready
+        self._own = own_machine()
+        self._left: set[str] = set()  # machines that are no longer there
+        self._tended = self._look_due = time.monotonic()
+        self._manned = self._tended  # when an actor was last seen ready
         self._complaint = ""
         self.members: list[Member[Item]] = [Member() for _ in range(size)]
-        self.answers: list[Any] = []  # the first one of every actor there ever was
+        self.answers: list[Any] = []
+        self.seconds = 0.0
 
-    def tend(self) -> None:
-        """Start actors in empty places.
+    def tend(self, waiting: int) -> None:
+        """Start actors in empty places, and in new ones if CPUs are free for work that waits.
+
+        Args:
+            waiting: how many items no actor has yet.
 
         Raises:
-            UserError: no actor has been ready for too long.
+            UserError: no actor has been ready for too long, or Ray on this machine has ended.
         """
         now = time.monotonic()
+        self.seconds += (now - self._tended) * len(self.members)
+        self._tended = now
+        if now >= self._look_due:
+            self._look_due = now + _LOOK_SECONDS
+            self._look(waiting)
         for member in self.members:
             if member.actor is None and member.due <= now:
                 member.actor = self._spawn()
@@ -81,6 +111,15 @@ class Crew(Generic[Item]):
                 "run the same command again once that is over"
             )
 
+    def _look(self, waiting: int) -> None:
+        if not is_there(self._own):
+            raise UserError("Ray has ended on this machine, killed perhaps; run the same command again")
+        if all(member.is_ready for member in self.members):
+            room = int(min(free_cpus(), self._most - len(self.members), waiting))
+            self.members += [Member(is_late=True) for _ in range(room)]
+            if room > 0:
+                say(f"{room} more CPUs are free: {len(self.members)} worker processes from now on")
+
     def starting(self) -> list[Any]:
         """References of the first answers that are still awaited."""
         return [member.starting for member in self.members if member.starting is not None]
@@ -88,7 +127,7 @@ class Crew(Generic[Item]):
     def welcome(self, member: Member[Item]) -> None:
         """Take note of a member's first answer.
 
-        A replacement that cannot start is tried again, for its machine may be in trouble that passes.
+        One that comes late and cannot start is tried again, for its machine may be in trouble that passes.
 
         Raises:
             UserError: an actor of the beginning cannot start; it would not with any item.
@@ -96,22 +135,36 @@ class Crew(Generic[Item]):
         try:
             answer = ray.get(member.starting)
         except RayError as error:
-            if not member.is_replacement:
+            if not member.is_late:
                 raise UserError(f"a worker process cannot start: {in_one_line(error)}") from error
             self._complain(in_one_line(error))
             self.replace(member)
-            member.due = time.monotonic() + _RETRY_SECONDS
+            member.due = time.monotonic() + min(_RETRY_SECONDS * 2**member.failures, _LONGEST_RETRY_SECONDS)
+            member.failures += 1
         else:
             member.starting = None
+            member.failures = 0
+            member.machine = machine_of(member.actor)
             self.answers.append(answer)
 
+    def has_left(self, member: Member[Item]) -> bool:
+        """Whether the machine on which a member's actor was is no longer there."""
+        if member.machine and member.machine not in self._left and not is_there(member.machine):
+            self._left.add(member.machine)
+            self._look_due = 0.0
+            say("a machine has left the cluster; what it was working on is done again elsewhere")
+        return member.machine in self._left
+
     def replace(self, member: Member[Item]) -> list[Item]:
-        """Empty a place, for `tend` to fill it; returns the items its actor had, oldest first."""
+        """Empty a place, for `tend` to fill it, or close it; returns its actor's items, oldest first."""
+        if self._grows and len(self.members) > 1 and self.has_left(member):
+            self.members = [other for other in self.members if other is not member]
         items = list(member.tasks.values())
         member.tasks.clear()
         ray.kill(member.actor)  # one that is only out of reach would keep its CPU
         member.actor = member.starting = None
-        member.is_replacement = True
+        member.is_late = True
+        member.machine = ""
         member.due = 0.0
         return items
 

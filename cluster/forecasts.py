@@ -27,15 +27,21 @@ def begin(dataset: Dataset, episodes: int, expected: Forecast, pilot: Tally) -> 
         expected: of the job.
         pilot: what has been done of it.
     """
-    account = [_entry(pilot, expected.actors)]
+    account = [_entry(pilot, pilot.seconds * expected.actors)]
     _write(dataset, {"episodes": episodes, "expected": expected.to_json(), "spent": account})
 
 
-def spent(dataset: Dataset, tally: Tally, actors: int) -> None:
-    """Add what a command has done to the account of the plan, if there is one."""
+def spent(dataset: Dataset, tally: Tally, actor_seconds: float) -> None:
+    """Add what a command has done to the account of the plan, if there is one.
+
+    Args:
+        dataset: beside which the plan is kept.
+        tally: what has been done.
+        actor_seconds: for how long there were actors, summed over them.
+    """
     plan = _read(dataset)
     if plan and "off" not in plan and tally.episodes:
-        _write(dataset, {**plan, "spent": [*plan["spent"], _entry(tally, actors)]})
+        _write(dataset, {**plan, "spent": [*plan["spent"], _entry(tally, actor_seconds)]})
 
 
 def review(dataset: Dataset) -> dict[str, float]:
@@ -96,10 +102,10 @@ def _text(estimate: Estimate, factor: float) -> str:
     return f"{value:.{places}f} ± {margin:.{places}f}"
 
 
-def _entry(tally: Tally, actors: int) -> dict[str, int | float]:
+def _entry(tally: Tally, actor_seconds: float) -> dict[str, int | float]:
     return {
         "episodes": tally.episodes,
-        "actor_seconds": tally.seconds * actors,
+        "actor_seconds": actor_seconds,
         "core_seconds": tally.core_seconds,
         "size": tally.size,
         "bad": tally.bad,

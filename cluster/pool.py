@@ -12,6 +12,9 @@ from ray.exceptions import RayError, RayTaskError
 
 from cluster.crew import Crew, Member, full_text, in_one_line
 
+MACHINES = 10
+"""An item is given up after the loss of that many machines: it may be what brings them down."""
+
 _POLL_SECONDS = 1.0
 
 Item = TypeVar("Item")
@@ -51,7 +54,7 @@ class Limits:
 
     Attributes:
         in_flight: items handed to an actor at a time.
-        attempts: of one item, before it is given up.
+        attempts: of one item, before it is given up; those whose machine left do not count.
         seconds: of one attempt, before its actor is killed and replaced.
         start_seconds: without a single actor that is ready for work, before all is given up.
     """
@@ -68,23 +71,38 @@ class Pool(Generic[Item, Result]):
     Args:
         spawn: starts one actor, which has a method `ready`, and returns its handle.
         submit: hands an item to an actor and returns the object reference of its result.
-        size: how many actors.
+        size: how many actors there are at first.
         limits: of the work in flight.
+        most: how many actors there may be, as CPUs become free; `size` if that is more.
     """
 
     def __init__(
-        self, *, spawn: Callable[[], Any], submit: Callable[[Any, Item], Any], size: int, limits: Limits
+        self,
+        *,
+        spawn: Callable[[], Any],
+        submit: Callable[[Any, Item], Any],
+        size: int,
+        limits: Limits,
+        most: float = 0,
     ) -> None:
         self._submit = submit
         self._limits = limits
-        self._crew: Crew[Item] = Crew(spawn=spawn, size=size, patience=limits.start_seconds)
+        self._crew: Crew[Item] = Crew(
+            spawn=spawn, size=size, most=max(size, most), patience=limits.start_seconds
+        )
         self._queue: deque[Item] = deque()
         self._attempts: Counter[Item] = Counter()
+        self._machines: Counter[Item] = Counter()
 
     @property
     def answers(self) -> list[Any]:
         """What the actors' `ready` returned, those of actors that were replaced included."""
         return self._crew.answers
+
+    @property
+    def actor_seconds(self) -> float:
+        """For how long there were actors, summed over them."""
+        return self._crew.seconds
 
     def __enter__(self) -> "Pool[Item, Result]":
         return self
@@ -102,7 +120,7 @@ class Pool(Generic[Item, Result]):
         """
         self._queue.extend(items)
         while self._queue or any(member.tasks for member in self._crew.members):
-            self._crew.tend()
+            self._crew.tend(len(self._queue))
             self._fill()
             for outcome in [*self._finished(), *self._overdue()]:
                 if isinstance(outcome, Failed) and outcome.attempts_left:
@@ -135,7 +153,9 @@ class Pool(Generic[Item, Result]):
         try:
             result = ray.get(task)
         except RayTaskError as error:
-            yield self._failed(self._take(member, task), in_one_line(error), full_text(error), error.cause)
+            item = self._take(member, task)
+            self._attempts[item] += 1
+            yield self._failed(item, in_one_line(error), full_text(error), error.cause)
         except RayError as error:  # its process or machine is gone, or was out of memory
             died = f"its worker process died: {in_one_line(error)}"
             yield from self._replace(member, died, full_text(error))
@@ -154,10 +174,13 @@ class Pool(Generic[Item, Result]):
 
     def _replace(self, member: Member[Item], error: str, text: str) -> Iterator[Failed[Item]]:
         """A new actor in the place of a lost one; only the item it was working on has failed."""
+        has_left = self._crew.has_left(member)
         failed, *waiting = self._crew.replace(member)
         self._queue.extendleft(reversed(waiting))
-        yield self._failed(failed, error, text, None)
+        (self._machines if has_left else self._attempts)[failed] += 1
+        yield self._failed(failed, f"its machine left: {error}" if has_left else error, text, None)
 
     def _failed(self, item: Item, error: str, text: str, cause: BaseException | None) -> Failed[Item]:
-        self._attempts[item] += 1
-        return Failed(item, error, text, cause, self._limits.attempts - self._attempts[item])
+        is_spent = self._machines[item] >= MACHINES
+        left = 0 if is_spent else self._limits.attempts - self._attempts[item]
+        return Failed(item, error, text, cause, left)

@@ -1,0 +1,47 @@
+"""Machines of the connected cluster: whether one is still there, and what all have free."""
+
+import socket
+from typing import Any
+
+import ray
+from ray._private.state import actors
+from ray.exceptions import RpcError
+
+KNOCK_SECONDS = 2.0
+"""How long a machine has to answer; Ray itself takes a quarter of a minute to miss one."""
+
+
+def own_machine() -> str:
+    """The id of the machine whose Ray processes this driver uses."""
+    return str(ray.get_runtime_context().get_node_id())
+
+
+def machine_of(actor: Any) -> str:
+    """The id of the machine on which an actor runs; "" if the actor is lost already."""
+    known = actors(actor._actor_id.hex()) or {}
+    return str(known.get("Address", {}).get("NodeID", ""))
+
+
+def is_there(machine: str) -> bool:
+    """Whether a machine still belongs to the cluster: Ray lists it as alive, and its raylet answers."""
+    try:
+        nodes = ray.nodes()
+    except RpcError:  # the head is gone, and the cluster with it
+        return False
+    for node in nodes:
+        if node["NodeID"] == machine and node["Alive"]:
+            return _answers(node["NodeManagerAddress"], node["NodeManagerPort"])
+    return False
+
+
+def free_cpus() -> int:
+    """CPUs of all machines that nothing occupies just now."""
+    return int(ray.available_resources().get("CPU", 0))
+
+
+def _answers(host: str, port: int) -> bool:
+    try:
+        socket.create_connection((host, port), timeout=KNOCK_SECONDS).close()
+    except OSError:
+        return False
+    return True
