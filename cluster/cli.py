@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cluster.config import Settings
+from cluster.config import Part, Settings
 from cluster.errors import UserError
 from cluster.options import (
     Address,
@@ -47,7 +47,9 @@ app = typer.Typer(
 
 
 @contextmanager
-def _services(settings: Settings, address: str | None) -> Iterator[tuple["Session", "Tracker"]]:
+def _services(
+    settings: Settings, address: str | None, parts: tuple[Part, ...] = ("dashboard",)
+) -> Iterator[tuple["Session", "Tracker"]]:
     """The tracker, whose store must exist before anything else starts, and the Ray session."""
     from cluster.session import connect
     from cluster.tracking import open_tracker
@@ -56,7 +58,7 @@ def _services(settings: Settings, address: str | None) -> Iterator[tuple["Sessio
     if store != settings.tracking.uri:
         durable(Path(store))
     tracker = open_tracker(settings.tracking)
-    with interruptible(), connect(settings.ray, address) as session:
+    with interruptible(), connect(settings.ray, address, parts) as session:
         yield session, tracker
 
 
@@ -110,7 +112,7 @@ def collect(
     from cluster.collect import foretell
 
     settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
-    with _services(settings, address) as (session, tracker):
+    with _services(settings, address, parts=()) as (session, tracker):
         (foretell if plan else run_collect)(
             setup=chosen,
             episodes=episodes,

@@ -1,9 +1,9 @@
 """The work of a collection: plan the missing shards, submit them to a pool of actors, gather, clean up."""
 
 import errno
+import sys
 from collections import deque
 from collections.abc import Iterable
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +55,9 @@ def planned(identity: Identity, episodes: int, folder: Path) -> tuple[Dataset, l
     return dataset, dataset.missing(episodes)
 
 
-def growth(settings: CollectSettings) -> float:
+def growth(settings: CollectSettings) -> int:
     """How many actors there may be as CPUs become free: as many as are asked for."""
-    return inf if settings.actors == "all" else settings.actors
+    return sys.maxsize if settings.actors == "all" else settings.actors
 
 
 def rollout_pool(
@@ -65,7 +65,7 @@ def rollout_pool(
     settings: CollectSettings,
     actors: int,
     actor: type[RolloutActor] = RolloutActor,
-    most: float = 0,
+    most: int = 0,
 ) -> Pool[Shard, ShardReport]:
     """Actors that roll out shards of a dataset, one CPU each; as many more as become free, up to `most`."""
     remote: Any = ray.remote(actor)

@@ -22,6 +22,10 @@ UserPath = Annotated[Path, AfterValidator(Path.expanduser)]
 """A path in which a leading `~` stands for the user's home."""
 
 
+Part = Literal["dashboard"]
+"""What a cluster started by a command may do without: the dashboard, which Ray Train queries all the time."""
+
+
 class Section(BaseModel):
     """What all sections share: they cannot change, and an unknown key is an error."""
 

@@ -1,6 +1,6 @@
 """A crew of Ray actors: each gets work only after its first answer, and is replaced when it is lost.
 
-It may grow with the cluster: a place is added for a CPU that becomes free, and closed when its machine leaves.
+It may grow with the cluster: a place is added for a CPU that becomes free, and closed with its machine.
 """
 
 import re
@@ -69,7 +69,7 @@ class Crew(Generic[Item]):
         seconds: that all places together have existed, in seconds.
     """
 
-    def __init__(self, *, spawn: Callable[[], Any], size: int, most: float, patience: float) -> None:
+    def __init__(self, *, spawn: Callable[[], Any], size: int, most: int, patience: float) -> None:
         self._spawn = spawn
         self._most = most
         self._grows = most > size
@@ -115,7 +115,7 @@ class Crew(Generic[Item]):
         if not is_there(self._own):
             raise UserError("Ray has ended on this machine, killed perhaps; run the same command again")
         if all(member.is_ready for member in self.members):
-            room = int(min(free_cpus(), self._most - len(self.members), waiting))
+            room = min(free_cpus(), self._most - len(self.members), waiting)
             self.members += [Member(is_late=True) for _ in range(room)]
             if room > 0:
                 say(f"{room} more CPUs are free: {len(self.members)} worker processes from now on")
@@ -127,15 +127,16 @@ class Crew(Generic[Item]):
     def welcome(self, member: Member[Item]) -> None:
         """Take note of a member's first answer.
 
-        One that comes late and cannot start is tried again, for its machine may be in trouble that passes.
+        One that was killed, or comes late and cannot start, is tried again: its machine may be in trouble
+        that passes.
 
         Raises:
-            UserError: an actor of the beginning cannot start; it would not with any item.
+            UserError: an actor of the beginning raises an error; it would with any item.
         """
         try:
             answer = ray.get(member.starting)
         except RayError as error:
-            if not member.is_late:
+            if not member.is_late and isinstance(error, RayActorError) and error.actor_init_failed:
                 raise UserError(f"a worker process cannot start: {in_one_line(error)}") from error
             self._complain(in_one_line(error))
             self.replace(member)
@@ -176,7 +177,7 @@ class Crew(Generic[Item]):
 
     def _complain(self, complaint: str) -> None:
         if complaint != self._complaint:
-            say(f"a worker process that replaces a lost one cannot start yet: {complaint}")
+            say(f"a worker process cannot start yet: {complaint}")
         self._complaint = complaint
 
 

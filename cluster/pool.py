@@ -83,7 +83,7 @@ class Pool(Generic[Item, Result]):
         submit: Callable[[Any, Item], Any],
         size: int,
         limits: Limits,
-        most: float = 0,
+        most: int = 0,
     ) -> None:
         self._submit = submit
         self._limits = limits

@@ -15,7 +15,7 @@ from ray._private.services import find_bootstrap_address
 from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
 from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 
-from cluster.config import RaySettings
+from cluster.config import Part, RaySettings
 from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
 
@@ -61,13 +61,16 @@ class Session:
 
 
 @contextmanager
-def connect(settings: RaySettings, address: str | None) -> Iterator[Session]:
+def connect(
+    settings: RaySettings, address: str | None, parts: tuple[Part, ...] = ("dashboard",)
+) -> Iterator[Session]:
     """Joins a running cluster, or starts one on this machine that listens on loopback only.
 
     Args:
         settings: how to start one, and how long a running one may take to answer.
         address: `host:port`, `auto` for the one running on this machine, or None: then the cluster of the
             environment's RAY_ADDRESS, which Ray sets inside a submitted job, or a new one.
+        parts: of a new one; each costs CPU time for as long as the cluster lives.
 
     Raises:
         UserError: the cluster is unreachable, refuses the token, or cannot be started.
@@ -77,7 +80,7 @@ def connect(settings: RaySettings, address: str | None) -> Iterator[Session]:
     if wanted:
         _join(settings, wanted)
     else:
-        _start(settings)
+        _start(settings, parts)
     try:
         with terminating_as_exit():
             yield _session(is_local=not wanted)
@@ -92,8 +95,8 @@ def _session(*, is_local: bool) -> Session:
     return Session(ray.get_runtime_context().gcs_address, is_local, cpus, gpus)
 
 
-def _start(settings: RaySettings) -> None:
-    """Starts a cluster. Its dashboard runs too, because Ray Train queries it all the time."""
+def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
+    """Starts a cluster."""
     _stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
     try:
@@ -102,7 +105,7 @@ def _start(settings: RaySettings) -> None:
             num_cpus=None if settings.num_cpus == "all" else settings.num_cpus,
             resources={"hardware": 1},
             object_store_memory=settings.object_store_memory,
-            include_dashboard=True,
+            include_dashboard="dashboard" in parts,
             dashboard_host=LOOPBACK,
             log_to_driver=False,
             logging_level=logging.ERROR,

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from ray.cluster_utils import Cluster
 
 RAY = Path(sys.executable).parent / "ray"
+MACHINE = {"include_dashboard": False, "object_store_memory": 100_000_000}
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,18 @@ def head(tmp_path_factory):
     finally:
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=180)
+
+
+@pytest.fixture
+def machines(monkeypatch):
+    """A cluster on loopback to which machines may be added, and from which they may be torn.
+
+    Its head has no CPUs; it wants no token.
+    """
+    monkeypatch.delenv("RAY_AUTH_TOKEN")
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, **MACHINE})
+    yield cluster
+    cluster.shutdown()
 
 
 def wait_until_served(process: subprocess.Popen, ports: list[int], log: Path) -> None:

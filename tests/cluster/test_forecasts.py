@@ -90,9 +90,10 @@ def test_the_plan_is_no_part_of_the_dataset(dataset):
 def test_how_far_off_a_plan_was_is_its_account_against_it(dataset):
     """Twenty episodes of a killed command are missing in the account: they count on neither side."""
     begin(dataset, 0, EXPECTED, did(20, 0.4))
-    spent(dataset, did(60, 1.4, bad=0.6), 2)
+    spent(dataset, did(60, 1.4, bad=0.6), 5400.0)
     off = review(dataset)
     assert off["plan/core_hours_off"] == pytest.approx(1.8 / 1.6 - 1)
+    assert off["plan/hours_off"] == pytest.approx(0.75 / 0.8 - 1, abs=1e-3)
     assert off["plan/bytes_off"] == pytest.approx(80 * 12_000 / 8e5 - 1)
     assert off["plan/badness_off"] == pytest.approx((20 * 0.5 + 60 * 0.6) / 80 / 0.5 - 1)
 
@@ -103,7 +104,7 @@ def test_a_plan_is_judged_once_and_not_before_its_end(dataset):
     begin(dataset, 0, EXPECTED, did(20, 0.4))
     assert review(dataset)
     kept = (dataset.folder / PLAN).read_text()
-    spent(dataset, did(60, 1.4), 2)
+    spent(dataset, did(60, 1.4), 5400.0)
     assert review(dataset) == {}
     assert (dataset.folder / PLAN).read_text() == kept
 
@@ -111,7 +112,7 @@ def test_a_plan_is_judged_once_and_not_before_its_end(dataset):
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"expected": {}}', '{"expected": 1, "spent": [1]}'])
 def test_a_plan_that_nobody_can_read_changes_nothing(dataset, content):
     (dataset.folder / PLAN).write_text(content)
-    spent(dataset, did(60, 1.4), 2)
+    spent(dataset, did(60, 1.4), 5400.0)
     assert review(dataset) == {}
     assert (dataset.folder / PLAN).read_text() == content
 

@@ -204,6 +204,15 @@ def test_waiting_for_a_writer_lasts_until_its_process_is_gone_and_no_longer_than
         assert is_dead(names[0])
 
 
+def test_a_writer_whose_parent_never_asks_how_it_ended_is_dead():
+    """As in a container whose first process collects nobody's children."""
+    with subprocess.Popen([sys.executable, "-c", "pass"]) as process:
+        host, boot, _ = writer().split(".")
+        wait_for_end([f"{host}.{boot}.{process.pid}"], 60.0)
+        assert process.returncode is None
+        assert is_dead(f"{host}.{boot}.{process.pid}")
+
+
 def test_sweeping_a_folder_that_never_wrote_is_harmless(tmp_path):
     assert shards.sweep(tmp_path) == 0
 

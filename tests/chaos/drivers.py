@@ -1,0 +1,141 @@
+"""`svaedc collect` as a process of its own that may be killed, and what its dataset must be in the end."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tests.chaos import victims
+from workers import setups
+from workers.collection import collect_shard
+from workers.dataset.folder import MANIFEST, Dataset, create
+from workers.dataset.identity import identity_of
+from workers.dataset.publication import WRITING, writer
+from workers.dataset.shards import Shard
+
+REPOSITORY = Path(__file__).parents[2]
+SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 6000
+"""Rollouts that cost next to nothing, in 1,500 files: what kills hit is starting, writing and publishing."""
+PATIENCE = 600.0
+"""Seconds after which something that must end is taken to hang."""
+
+
+def collected_here(folder: Path) -> Dataset:
+    """The dataset as one process makes it that nobody disturbs."""
+    setup = setups.load(SETUP)
+    dataset = create(folder, identity_of(setup, seed=SEED, episodes_per_shard=PER_SHARD))
+    for shard in dataset.missing(EPISODES):
+        collect_shard(setup, dataset, shard)
+    return dataset
+
+
+def command(folder: Path, store: Path, *options: str) -> list[str]:
+    """The command line of a driver."""
+    return [
+        *(sys.executable, "-m", "cluster", "collect", "--setup", SETUP, "--dataset", str(folder)),
+        *("--episodes", str(EPISODES), "--seed", str(SEED)),
+        *("--set", f"collect.episodes_per_shard={PER_SHARD}", "--set", "collect.actors=2"),
+        *("--set", f"tracking.uri=sqlite:///{store}", "--set", "ray.num_cpus=2", *options),
+    ]
+
+
+def start(arguments: list[str], log: Path, **environment: str) -> subprocess.Popen[bytes]:
+    """A driver, whose words are appended to a log."""
+    with log.open("ab") as output:
+        return subprocess.Popen(
+            arguments, cwd=REPOSITORY, env={**os.environ, **environment}, stdout=output, stderr=output
+        )
+
+
+@dataclass
+class Blows:
+    """SIGKILLs that a seed decides: whom and when; and their tally.
+
+    Attributes:
+        folder: where the datasets are.
+        seed: of all draws.
+        dealt: kills by the kind of victim.
+        unfinished: kills of an actor that left a file unfinished.
+        seen: every process that was below a driver when something was killed.
+    """
+
+    folder: Path
+    seed: int
+    dealt: Counter[str] = field(default_factory=Counter)
+    unfinished: int = 0
+    seen: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Begin the sequence of draws."""
+        self.rng = np.random.default_rng(self.seed)
+
+    def wait(self, longest: float) -> None:
+        """A random while."""
+        time.sleep(self.rng.uniform(0.0, longest))
+
+    def actor(self, root: int) -> bool:
+        """Kill one of the rollout processes below a process; False when there is none."""
+        pids = victims.actors(root)
+        draw = self.rng.random()
+        if not pids or not victims.kill(pid := sorted(pids)[int(draw * len(pids))]):
+            return False
+        self.dealt["actor"] += 1
+        self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{pid}")))
+        return True
+
+    def driver(self, process: subprocess.Popen[bytes]) -> None:
+        """Kill a driver, unless it has ended."""
+        self.seen.update(victims.below(process.pid))
+        if process.poll() is None:
+            process.kill()
+            self.dealt["driver"] += 1
+        process.wait()
+
+    def raylet(self, process: subprocess.Popen[bytes]) -> None:
+        """Kill Ray itself below a driver, if it runs by now."""
+        self.seen.update(victims.below(process.pid))
+        for pid in victims.raylets(process.pid):
+            self.dealt["raylet"] += victims.kill(pid)
+
+    def __str__(self) -> str:
+        """The tally."""
+        kinds = ", ".join(f"{count} of {kind}s" for kind, count in sorted(self.dealt.items()))
+        return f"{self.dealt.total()} kills (CHAOS_SEED={self.seed}): {kinds}; {self.unfinished} amid a file"
+
+
+def seed() -> int:
+    """CHAOS_SEED, to deal the blows of an earlier test again; a fresh one otherwise."""
+    return int(os.environ.get("CHAOS_SEED", time.time_ns() % 2**32))
+
+
+def begun(folder: Path) -> Path:
+    """A dataset of no episodes in which a living process has an unfinished file: its path."""
+    create(folder, identity_of(setups.load(SETUP), seed=SEED, episodes_per_shard=PER_SHARD))
+    unfinished = folder / WRITING / f"{Shard(0, PER_SHARD).name}.{writer()}"
+    unfinished.write_bytes(b"half")
+    return unfinished
+
+
+def published(folder: Path) -> dict[str, bytes]:
+    """Every file of a dataset but those that are unfinished."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def require_same(folder: Path, undisturbed: dict[str, bytes], unfinished: list[Path]) -> None:
+    """Nothing lost, doubled or changed, and nothing unfinished but what its living writer left there."""
+    assert published(folder) == undisturbed
+    assert list((folder / WRITING).iterdir()) == unfinished
+    put_aside = folder / "quarantine"
+    assert not put_aside.exists() or list(put_aside.iterdir()) == []
+
+
+def require_part(folder: Path, undisturbed: dict[str, bytes]) -> None:
+    """What is published already is as it would be without faults; a digest may be there before its shard."""
+    for name, content in published(folder).items():
+        assert undisturbed[name] == content, name
+    assert (folder / MANIFEST).exists()

@@ -1,0 +1,168 @@
+"""`svaedc collect` under random SIGKILLs of whatever takes part in it: the bytes stay the same.
+
+The kills are drawn from a seed that is printed: CHAOS_SEED=N make chaos draws them again.
+"""
+
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from ray._private.node import Node
+from ray.cluster_utils import Cluster
+
+from tests.chaos import victims
+from tests.chaos.drivers import (
+    PATIENCE,
+    Blows,
+    begun,
+    collected_here,
+    command,
+    published,
+    require_part,
+    require_same,
+    seed,
+    start,
+)
+from tests.cluster.conftest import MACHINE
+from workers.dataset.folder import MANIFEST
+
+pytestmark = pytest.mark.chaos
+
+ALONE, TOGETHER = 110, 110
+"""Kills of one driver with Ray of its own, and of two on a cluster."""
+BLOWS_OF_A_LIFE = 12
+DISKS = 4
+EXPECTED_ENDS = ("Ray has ended on this machine", "shards kept failing", "no worker process could start")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """The files of a collection without faults."""
+    return published(collected_here(tmp_path_factory.mktemp("undisturbed") / "dataset").folder)
+
+
+def small(size: int, folder: Path, out: Path, arguments: list[str]) -> list[str]:
+    """A command in a name space of its own, where a folder is a disk of so many kB; then it is copied out."""
+    shell = 'mount -t tmpfs -o size="$1k" tmpfs "$2" && from="$2" to="$3" && shift 3 && "$@"; code=$?; '
+    shell += 'cp -a "$from/." "$to" && exit $code'
+    return ["unshare", "-r", "-m", "sh", "-c", shell, "sh", str(size), str(folder), str(out), *arguments]
+
+
+def lived(driver: subprocess.Popen, blows: Blows) -> int:
+    """Kill the actors of a driver, then it or its Ray or nothing; returns how it ended."""
+    longest, many = blows.rng.choice([0.0, 1.0]), int(blows.rng.integers(BLOWS_OF_A_LIFE))
+    last = blows.rng.choice(["driver", "raylet", "nothing"], p=[0.7, 0.1, 0.2])
+    blows.wait(8.0)  # somewhere in its start
+    deadline = time.monotonic() + PATIENCE
+    while many and driver.poll() is None:
+        assert time.monotonic() < deadline
+        many -= blows.actor(driver.pid)
+        blows.wait(longest + 0.1)
+    if last != "nothing":
+        getattr(blows, last)(driver)
+    return driver.wait(PATIENCE)
+
+
+def require_explained(code: int, log: Path) -> None:
+    """A driver that was not killed ends well, or says what befell it; never with a traceback."""
+    said = log.read_text()
+    assert "Traceback" not in said
+    assert code <= 0 or any(reason in said for reason in EXPECTED_ENDS), said
+
+
+def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed):
+    blows, finished, unfinished = Blows(tmp_path, seed()), 0, None
+    print(f"CHAOS_SEED={blows.seed}")
+    while blows.dealt.total() < ALONE or not finished:
+        folder, log = tmp_path / f"dataset-{finished}", tmp_path / f"after-{blows.dealt.total()}-kills.log"
+        unfinished = unfinished or begun(folder)
+        code = lived(start(command(folder, tmp_path / "mlflow.db"), log), blows)
+        require_explained(code, log)
+        require_part(folder, undisturbed)
+        if code == 0:
+            require_same(folder, undisturbed, [unfinished])
+            unfinished, finished = None, finished + 1
+    print(f"{blows}; {finished} collections finished")
+    assert victims.wait_until_gone(blows.seen, 60.0) == set()
+
+
+class Pair:
+    """Two drivers on one dataset, each started again whenever it was killed or has given up."""
+
+    def __init__(self, folder: Path, address: str, log: Path) -> None:
+        self._commands = [
+            command(folder, log.with_suffix(f".{seat}.db"), "--address", address) for seat in range(2)
+        ]
+        self._log = log
+        self.seats = [start(command, log) for command in self._commands]
+
+    def tend(self) -> bool:
+        """Start again what has not reached the end; whether one has."""
+        for seat, process in enumerate(self.seats):
+            if process.poll() == 0:
+                return True
+            if process.poll() is not None:
+                self.seats[seat] = start(self._commands[seat], self._log)
+        return False
+
+    def end(self) -> list[int]:
+        """How the two end when nobody disturbs them any more, started again if they were killed."""
+        self.tend()
+        return [process.wait(PATIENCE) for process in self.seats]
+
+
+def deal(blows: Blows, pair: Pair, machines: Cluster, others: list[Node]) -> None:
+    """One blow to something that two drivers need: mostly an actor, at times a driver or a machine."""
+    kind, seat = blows.rng.choice(["actor", "driver", "machine"], p=[0.84, 0.1, 0.06]), blows.rng.integers(2)
+    if kind == "actor":
+        blows.actor(os.getpid())
+    elif kind == "driver":
+        blows.driver(pair.seats[seat])
+    else:
+        machines.remove_node(others.pop(seat), allow_graceful=False)
+        others.append(machines.add_node(num_cpus=4, **MACHINE))
+        blows.dealt["raylet"] += 1
+
+
+def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(tmp_path, undisturbed, machines):
+    blows, finished = Blows(tmp_path, seed()), 0
+    print(f"CHAOS_SEED={blows.seed}")
+    others = [machines.add_node(num_cpus=4, **MACHINE) for _ in range(2)]
+    while blows.dealt.total() < TOGETHER or not finished:
+        folder, log = tmp_path / f"dataset-{finished}", tmp_path / f"pair-{finished}.log"
+        unfinished = begun(folder)
+        pair, deadline = Pair(folder, machines.address, log), time.monotonic() + PATIENCE
+        while not pair.tend():
+            assert time.monotonic() < deadline, log.read_text()
+            blows.wait(1.0)
+            deal(blows, pair, machines, others)
+        assert pair.end() == [0, 0], log.read_text()
+        assert "Traceback" not in log.read_text()
+        require_same(folder, undisturbed, [unfinished])
+        finished += 1
+    print(f"{blows}; {finished} collections finished by two drivers at once")
+
+
+def test_no_size_of_a_full_disk_loses_or_changes_a_byte(tmp_path, undisturbed):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    tried = subprocess.run(small(8, disk, tmp_path, ["true"]), capture_output=True, text=True, check=False)
+    if tried.returncode:
+        pytest.skip(f"a small disk cannot be mounted here, even in a name space: {tried.stderr.strip()}")
+    blows = Blows(tmp_path, seed())
+    print(f"CHAOS_SEED={blows.seed}")
+    for number, size in enumerate(blows.rng.integers(8, 4000, size=DISKS)):
+        out, log = tmp_path / f"dataset-{number}", tmp_path / f"disk-{number}.log"
+        out.mkdir()
+        arguments = small(size, disk, out, command(disk, tmp_path / "mlflow.db"))
+        assert start(arguments, log).wait(PATIENCE) == 1
+        assert "No space left on device" in log.read_text()
+        assert "Traceback" not in log.read_text()
+        assert not list(out.glob(".writing/*"))
+        if (out / MANIFEST).exists():
+            require_part(out, undisturbed)
+        print(f"full at {size} kB: {len(list(out.glob('*.parquet')))} shards safe")
+    assert start(command(out, tmp_path / "mlflow.db"), log).wait(PATIENCE) == 0, log.read_text()
+    require_same(out, undisturbed, [])
