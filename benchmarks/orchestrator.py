@@ -130,7 +130,7 @@ def main():
     print(" episodes  shards    wall s  ms/episode  driver CPU  all CPU  start: < 50  first 10 %  complete")
     with (
         tempfile.TemporaryDirectory() as name,
-        connect(RaySettings(num_cpus=os.cpu_count() or 1), address=None) as session,
+        connect(RaySettings(num_cpus=os.cpu_count() or 1), address=None, parts=()) as session,
     ):
         for episodes in counts:
             print(measured(episodes, session, Path(name)), flush=True)
