@@ -1,8 +1,8 @@
 """Rollouts on Ray actors against the same rollouts in plain processes: what the orchestrator costs in speed.
 
 A plain process rolls out shards and does nothing else; an actor stores them as well. Clusters, processes and
-imports start before the clock does. The two take turns, each turn of the actors with a cluster of its own, so that
-no Ray idles beside the plain processes:
+imports start before the clock does. The two take turns, each turn of the actors with a cluster of its own, so
+that no Ray idles beside the plain processes:
 
     python benchmarks/actors.py --episodes 4096 --rounds 3
 """
