@@ -70,6 +70,7 @@ def _bar(what: str) -> Progress:
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
         console=Console(stderr=True),
+        refresh_per_second=2,
     )
 
 

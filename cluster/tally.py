@@ -12,7 +12,8 @@ from cluster.tracking import Run
 from workers.collection import ShardReport
 from workers.dataset.shards import Shard
 
-RECORD_SECONDS = 10.0
+RECORD_SECONDS = 30.0
+"""Between two records: each is a few tens of milliseconds in which the driver does nothing else."""
 
 
 @dataclass
