@@ -111,7 +111,7 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
             logging_level=logging.ERROR,
             _temp_dir=str(settings.temporary_folder),
         )
-    except (OSError, ValueError, RuntimeError, RaySystemError) as error:
+    except Exception as error:  # Ray raises bare ones, as when a busy machine is slow to start it
         raise UserError(
             f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
             "which --set ray.temporary_folder=DIR moves"

@@ -34,7 +34,10 @@ ALONE, TOGETHER = 110, 110
 """Kills of one driver with Ray of its own, and of two on a cluster."""
 BLOWS_OF_A_LIFE = 12
 DISKS = 4
-EXPECTED_ENDS = ("Ray has ended on this machine", "shards kept failing", "no worker process could start")
+EXPECTED_ENDS = (
+    *("Ray has ended on this machine", "Ray cannot start here"),
+    *("shards kept failing", "no worker process could start"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +84,9 @@ def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed):
         code = lived(start(command(folder, tmp_path / "mlflow.db"), log), blows)
         require_explained(code, log)
         require_part(folder, undisturbed)
+        if published(folder).keys() == undisturbed.keys():
+            # The next command finds nothing to do: what it shall sweep must have no living writer any more.
+            assert victims.wait_until_gone(blows.seen, 60.0) == set()
         if code == 0:
             require_same(folder, undisturbed, [unfinished])
             unfinished, finished = None, finished + 1
@@ -101,16 +107,17 @@ class Pair:
     def tend(self) -> bool:
         """Start again what has not reached the end; whether one has."""
         for seat, process in enumerate(self.seats):
-            if process.poll() == 0:
-                return True
-            if process.poll() is not None:
+            if process.poll() not in (None, 0):
                 self.seats[seat] = start(self._commands[seat], self._log)
-        return False
+        return any(process.poll() == 0 for process in self.seats)
 
-    def end(self) -> list[int]:
-        """How the two end when nobody disturbs them any more, started again if they were killed."""
-        self.tend()
-        return [process.wait(PATIENCE) for process in self.seats]
+    def end(self) -> None:
+        """Wait until both have reached the end, now that nobody disturbs them any more."""
+        deadline = time.monotonic() + PATIENCE
+        while any(process.poll() != 0 for process in self.seats):
+            assert time.monotonic() < deadline, self._log.read_text()
+            self.tend()
+            time.sleep(0.1)
 
 
 def deal(blows: Blows, pair: Pair, machines: Cluster, others: list[Node]) -> None:
@@ -138,7 +145,7 @@ def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(tmp_pat
             assert time.monotonic() < deadline, log.read_text()
             blows.wait(1.0)
             deal(blows, pair, machines, others)
-        assert pair.end() == [0, 0], log.read_text()
+        pair.end()
         assert "Traceback" not in log.read_text()
         require_same(folder, undisturbed, [unfinished])
         finished += 1
