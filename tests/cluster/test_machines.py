@@ -1,6 +1,7 @@
 """Machines that join a running collection, and machines that are torn from it."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.chaos.victims import kill, raylets
 from tests.cluster.conftest import MACHINE
 from workers import setups
 from workers.collection import collect_shard
@@ -47,10 +49,10 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def collecting(folder: Path, address: str) -> subprocess.Popen[bytes]:
+def collecting(folder: Path, address: str, *options: str) -> subprocess.Popen[bytes]:
     """A collection on all CPUs of a cluster, in which a single failed attempt gives a shard up."""
     command = [sys.executable, "-m", "cluster", "collect", "--setup", "slow", "--dataset", "data"]
-    command += ["--episodes", "1600", "--address", address]
+    command += ["--episodes", "1600", *options, *(["--address", address] if address else [])]
     settings = {"tracking.uri": "sqlite:///mlflow.db", "collect.episodes_per_shard": 4}
     settings |= {"collect.attempts_per_shard": 1, "collect.actors": "all"}
     command += [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
@@ -64,6 +66,24 @@ def wait_for(text: str, folder: Path, driver: subprocess.Popen[bytes]) -> None:
         assert driver.poll() is None, said
         assert time.monotonic() < deadline, said
         time.sleep(0.1)
+
+
+@pytest.mark.slow
+def test_a_collection_whose_ray_is_killed_says_so_and_the_same_command_goes_on(folder):
+    driver = collecting(folder, "", "--set", "ray.num_cpus=1")
+    wait_for("/1600 episodes", folder, driver)
+    (raylet,) = raylets(driver.pid)
+    assert kill(raylet)
+    assert driver.wait(PATIENCE) == 1
+    said = (folder / "log").read_text()
+    assert "error: Ray has ended on this machine" in said
+    assert "Traceback" not in said
+    before = len(open_dataset(folder / "data").shards())
+    again = collecting(folder, "", "--set", "ray.num_cpus=1")
+    wait_for("/1600 episodes", folder, again)
+    assert len(open_dataset(folder / "data").shards()) > before > 0
+    again.send_signal(signal.SIGINT)
+    again.wait(PATIENCE)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import pytest
 import ray
 
 from cluster.errors import UserError
+from cluster.machines import is_there, own_machine
 from cluster.pool import Done, Failed, Limits, Pool
 
 pytestmark = pytest.mark.usefixtures("ray_session")
@@ -55,6 +56,16 @@ class Fragile(Worker):
         if list(folder.glob("dies-1.*")) and (outages < 2 or (folder / "for ever").exists()):
             (folder / f"outage.{outages}").touch()
             raise OSError("the folder is away")
+
+
+class Stillborn(Worker):
+    """Is killed once while it starts."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        if not (folder / "killed").exists():
+            (folder / "killed").touch()
+            self._die()
 
 
 class Holder:
@@ -148,6 +159,40 @@ def test_actors_that_cannot_start_end_the_work_at_once_with_their_reason():
         pool_of(actor.remote, 1, PATIENT) as pool,
     ):
         list(pool.run(["works-0"]))
+
+
+def test_a_worker_that_is_killed_while_it_starts_is_replaced(tmp_path, capsys):
+    actor = ray.remote(Stillborn).options(num_cpus=1)
+    with pool_of(lambda: actor.remote(tmp_path), 1, PATIENT) as pool:
+        assert list(pool.run(["works-0"])) == [Done("works-0", "works-0")]
+    assert "a worker process cannot start yet" in capsys.readouterr().err
+
+
+def test_a_crew_that_may_grow_takes_the_cpus_that_become_free_and_no_more_than_there_is_work(tmp_path):
+    """One CPU of four is held for ever, two until the work has begun."""
+    actor = ray.remote(Worker).options(num_cpus=1)
+    pool = Pool(
+        spawn=lambda: actor.remote(tmp_path),
+        submit=lambda worker, item: worker.run.remote(item),
+        size=1,
+        limits=PATIENT,
+        most=9,
+    )
+    with cpus_held(1), pool:
+        with cpus_held(2):
+            results = list(pool.run(["works0-0"]))
+            assert len(pool.answers) == 1
+        deadline = time.monotonic() + 120
+        while len(pool.answers) < 3:
+            assert time.monotonic() < deadline
+            results += pool.run([f"works{len(results) + number}-0" for number in range(40)])
+        assert len(pool.answers) == 3
+    assert len(done(results)) == len(results)
+
+
+def test_a_machine_is_there_while_it_answers():
+    assert is_there(own_machine())
+    assert not is_there("0" * 56)
 
 
 def test_losing_a_worker_in_any_way_that_ray_knows_is_a_failed_attempt(tmp_path):
