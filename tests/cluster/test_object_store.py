@@ -1,6 +1,5 @@
 """`svaedc` on an object store: addresses, the commands, and a collection that is killed."""
 
-import os
 import subprocess
 import sys
 import time
@@ -31,16 +30,16 @@ SETUP = "quadratic-30d"
 
 
 @pytest.fixture
-def environment(object_store, monkeypatch) -> dict[str, str]:
-    """What a user sets who keeps data in that store, here and for commands."""
+def place(object_store, bucket, monkeypatch) -> str:
+    """An address in the store that the environment names, here and for commands."""
     monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{object_store}")
-    return {**os.environ}
+    return f"s3://{bucket}/data"
 
 
 @pytest.fixture
-def remote(bucket, environment) -> Dataset:
+def remote(place) -> Dataset:
     """Two shards of four episodes, collected by a rollout process."""
-    dataset = begun(dataset_location(f"s3://{bucket}/data"), 4)
+    dataset = begun(dataset_location(place), 4)
     worker = RolloutActor(SETUP, str(dataset.folder))
     for shard in dataset.missing(8):
         worker.collect(shard)
@@ -90,8 +89,7 @@ def test_a_rollout_process_writes_to_the_store_what_one_writes_to_a_disk(remote,
     assert content(remote.folder) == content(alone(tmp_path, 8, 4).folder)
 
 
-def test_commands_look_into_it_damage_is_named_then_repaired_then_gone(remote, bucket, tmp_path):
-    place = f"s3://{bucket}/data"
+def test_commands_look_into_it_damage_is_named_then_repaired_then_gone(remote, place, tmp_path):
     assert "8 in 2 shards" in run("info", place)
     run("export", place, "--format", "npz", "--out", str(tmp_path / "npz"))
     assert len(list((tmp_path / "npz").glob("*.npz"))) == 2
@@ -120,7 +118,7 @@ def test_errors_of_shards_and_the_account_of_a_plan_are_kept_in_it(remote):
 
 
 @pytest.mark.parametrize("where", ["away", "nowhere"])
-def test_a_store_that_cannot_be_used_is_told_with_the_remedy(where, free_port, object_store, remote):
+def test_a_store_that_cannot_be_used_is_told_with_the_remedy(where, free_port, remote):
     wrong = {
         "away": (f"s3://bucket/data?endpoint_override=127.0.0.1:{free_port}&scheme=http", "does not answer"),
         "nowhere": ("s3://nobody-s/data", "no bucket for s3://nobody-s.*: create it"),
@@ -136,16 +134,13 @@ def command(*arguments: str, root: Path) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_collection_into_a_store_that_is_killed_goes_on_to_the_bytes_of_a_disk_and_trains(
-    bucket, environment, tmp_path
-):
-    place = f"s3://{bucket}/data"
+def test_a_collection_into_a_store_that_is_killed_goes_on_to_the_bytes_of_a_disk_and_trains(place, tmp_path):
     collect = command(
         *("collect", "--setup", "franka", "--dataset", place, "--episodes", "240", "--seed", "3"),
         *("--set", "collect.episodes_per_shard=8", "--set", "collect.actors=2"),
         root=tmp_path,
     )
-    with subprocess.Popen(collect, env=environment) as first:
+    with subprocess.Popen(collect) as first:
         deadline = time.monotonic() + 600
         folder = dataset_location(place)
         while len(list(folder.glob("*.parquet"))) < 3:
@@ -154,12 +149,12 @@ def test_a_collection_into_a_store_that_is_killed_goes_on_to_the_bytes_of_a_disk
             time.sleep(0.1)
         first.kill()
     assert open_dataset(folder).episodes() < 240
-    subprocess.run(collect, env=environment, check=True)
+    subprocess.run(collect, check=True)
     dataset = open_dataset(folder)
     assert content(folder) == content(alone(tmp_path / "alone", 240, 8, "franka").folder)
     assert list((folder / WRITING).iterdir()) == []
     verify = [sys.executable, "-m", "cluster", "dataset", "verify", place]
-    said = subprocess.run(verify, env=environment, check=True, capture_output=True, text=True).stdout
+    said = subprocess.run(verify, check=True, capture_output=True, text=True).stdout
     assert "is whole: 240 episodes in 30 shards" in said
     train = command(
         *("train", "--dataset", place, "--model", str(tmp_path / "model"), "--preset", "compact"),
@@ -167,7 +162,7 @@ def test_a_collection_into_a_store_that_is_killed_goes_on_to_the_bytes_of_a_disk
         *("--set", f"train.cache_folder={tmp_path / 'cache'}"),
         root=tmp_path,
     )
-    subprocess.run(train, env=environment, check=True)
+    subprocess.run(train, check=True)
     _, metadata = checkpoint.load(tmp_path / "model" / "model.pt")
     assert metadata["dataset"] == dataset.fingerprint()
     [cache] = (tmp_path / "cache").iterdir()

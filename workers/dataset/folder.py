@@ -117,11 +117,11 @@ def open_dataset(folder: Location) -> Dataset:
     manifest = folder / MANIFEST
     if not manifest.exists():
         raise ValueError(f"{folder} holds no dataset: there is no {MANIFEST} in it")
-    return _opened(folder, manifest.read_text())
+    return _opened(folder, manifest.read_bytes())
 
 
-def _opened(folder: Location, text: str) -> Dataset:
+def _opened(folder: Location, manifest: bytes) -> Dataset:
     try:
-        return Dataset(folder, Identity.from_json(text))
+        return Dataset(folder, Identity.from_json(manifest.decode()))
     except ValueError as error:
         raise ValueError(f"{folder / MANIFEST} is damaged or of another version: {error}") from error

@@ -16,21 +16,21 @@ def manifest_text(identity: Identity) -> str:
     return json.dumps(json.loads(identity.to_json()), indent=2) + "\n"
 
 
-def begun(folder: Location, text: str) -> str:
-    """Write the manifest unless there is one; returns the text that counts, of two writers the first's."""
+def begun(folder: Location, text: str) -> bytes:
+    """Write the manifest unless there is one; returns the one that counts, of two writers the first's."""
     manifest = folder / MANIFEST
     if manifest.exists():
-        return manifest.read_text()
+        return manifest.read_bytes()
     if isinstance(folder, ObjectPath):
         return _claimed(folder, text)
     with temporary_file(folder, MANIFEST) as temporary:
         temporary.write_text(text)
         synchronise(temporary)
         link(temporary, manifest)
-    return manifest.read_text()
+    return manifest.read_bytes()
 
 
-def _claimed(folder: ObjectPath, text: str) -> str:
+def _claimed(folder: ObjectPath, text: str) -> bytes:
     """The same where no write can be made to depend on there being nothing.
 
     A writer first lays a claim in a name of its own, and goes on only if nobody else's claim is of another
@@ -44,20 +44,20 @@ def _claimed(folder: ObjectPath, text: str) -> str:
         rival = _rival(folder, text)
         if not rival and not manifest.exists():
             manifest.write_text(text)
-        return rival or manifest.read_text()
+        return rival or manifest.read_bytes()
     finally:
         claim.unlink(missing_ok=True)
 
 
-def _rival(folder: ObjectPath, text: str) -> str:
-    """The text of a living writer that claims the folder for something else; "" when there is none."""
+def _rival(folder: ObjectPath, text: str) -> bytes:
+    """The manifest of a living writer that claims the folder for something else; empty without one."""
     for path in (folder / WRITING).glob(f"{MANIFEST}.*"):
         if is_dead(path.name):
             continue
         try:
-            claimed = path.read_text()
+            claimed = path.read_bytes()
         except FileNotFoundError:
             continue  # withdrawn meanwhile; if it went on, the manifest is there
-        if claimed != text:
+        if claimed != text.encode():
             return claimed
-    return ""
+    return b""

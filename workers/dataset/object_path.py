@@ -91,8 +91,10 @@ class ObjectPath:
 
     def stat(self) -> Stat:
         """Its size, without a request if a listing said it already."""
-        with reaching(self):
-            return self.known or Stat(self._store.get_file_info(self._place).size)
+        if self.known is not None:
+            return self.known
+        with reaching(self), self._store.open_input_file(self._place) as file:
+            return Stat(file.size())
 
     def iterdir(self) -> Iterator["ObjectPath"]:
         """The objects directly below, none if there are none."""

@@ -17,6 +17,7 @@ OPTIONS = ("endpoint_override", "region", "scheme")
 
 Options = tuple[tuple[str, str], ...]
 
+_GONE = "AWS Error NO_SUCH_KEY"
 _REFUSED = "ACCESS_DENIED|INVALID_ACCESS_KEY|SIGNATURE|TOKEN|AUTHENTICATION|CREDENTIAL|CLIENT|status 403"
 
 
@@ -33,10 +34,13 @@ def reaching(path: object) -> Iterator[None]:
 
     Raises:
         StoreError: the store cannot be reached, or refuses.
+        FileNotFoundError: an object was removed between two requests of one reading.
     """
     try:
         yield
     except OSError as error:
+        if _GONE in str(error):
+            raise FileNotFoundError(errno.ENOENT, "no such object", str(path)) from error
         refused = refusal(path, error)
         if refused is None:
             raise
@@ -47,7 +51,8 @@ def refusal(path: object, error: Exception) -> StoreError | None:
     """What an error says about the store; None if it is about something else."""
     if isinstance(error, StoreError):
         return StoreError(error.errno, error.strerror)
-    return StoreError(*_explained(path, str(error))) if "AWS Error" in str(error) else None
+    is_of_store = "AWS Error" in str(error) and _GONE not in str(error)
+    return StoreError(*_explained(path, str(error))) if is_of_store else None
 
 
 def _explained(path: object, reason: str) -> tuple[int, str]:
