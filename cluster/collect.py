@@ -1,7 +1,6 @@
 """`svaedc collect`: collect what is missing in a dataset and record it, or foretell what that will cost."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from cluster.collection_work import growth, planned, rollout_pool, work
@@ -16,6 +15,7 @@ from cluster.tally import Tally
 from cluster.tracking import Run, Tracker
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity, identity_of
+from workers.dataset.location import Location
 from workers.dataset.shards import Shard
 from workers.forecast import forecast
 from workers.setups import Setup
@@ -28,7 +28,7 @@ def collect(
     *,
     setup: Setup,
     episodes: int,
-    folder: Path,
+    folder: Location,
     seed: int,
     repeats: int = 1,
     settings: CollectSettings,
@@ -64,7 +64,7 @@ def foretell(
     *,
     setup: Setup,
     episodes: int,
-    folder: Path,
+    folder: Location,
     seed: int,
     repeats: int = 1,
     settings: CollectSettings,

@@ -4,7 +4,6 @@ import errno
 import sys
 from collections import deque
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import ray
@@ -22,6 +21,7 @@ from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import Identity
 from workers.dataset.inventory import sweep_digests
+from workers.dataset.location import Location
 from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
 
@@ -39,7 +39,7 @@ LAST_REPORTS = 1024
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
 
-def planned(identity: Identity, episodes: int, folder: Path) -> tuple[Dataset, list[Shard]]:
+def planned(identity: Identity, episodes: int, folder: Location) -> tuple[Dataset, list[Shard]]:
     """The dataset in a folder, begun if need be, and the shards that are missing in it.
 
     Raises:

@@ -1,7 +1,7 @@
 """`svaedc dataset`: what is in a dataset, and whether it is whole."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -10,22 +10,28 @@ from rich.table import Table
 from cluster.dataset_export import export
 from cluster.dataset_repair import recomputed, repair_dataset
 from cluster.errors import UserError
-from cluster.options import durable, interruptible
+from cluster.options import dataset_location, durable, interruptible
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
 from workers.dataset.folder import Dataset, open_dataset
 from workers.dataset.identity import Identity
 from workers.dataset.inventory import inventory
+from workers.dataset.location import Location
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 from workers.dataset.verification import Problem, gaps, overlaps, verify
 
 app = typer.Typer(no_args_is_help=True, help="Look into a dataset, prove that it is whole, or repair it.")
 
-Folder = Annotated[Path, typer.Argument(help="Folder of the dataset.")]
+Folder = Annotated[
+    Any,  # a Location, which typer does not know
+    typer.Argument(
+        metavar="PLACE", help="Folder of the dataset, or s3://bucket/prefix.", parser=dataset_location
+    ),
+]
 
 
-def _opened(folder: Path) -> Dataset:
+def _opened(folder: Location) -> Dataset:
     try:
         return open_dataset(folder)
     except ValueError as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cluster.errors import UsageError, UserError
+from cluster.options import dataset_location
 from workers.controllers.controller import unit_cube
 from workers.dataset.folder import Dataset, open_dataset
 from workers.physics import Physics
@@ -85,7 +86,7 @@ def _recorded(wanted: str, rest: str, setup: Setup) -> Episode:
         raise UsageError(f"--x {wanted} names no episode; write dataset:FOLDER:INDEX")
     index = _whole(wanted, place, "INDEX")
     try:
-        dataset = open_dataset(Path(folder).expanduser())
+        dataset = open_dataset(dataset_location(folder))
         _require_same(dataset, setup)
         return dataset.episode(index)
     except IndexError as error:

@@ -6,13 +6,13 @@
 import json
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from cluster.progress import duration, say
 from cluster.tally import Tally
 from workers.dataset.folder import Dataset
-from workers.dataset.publication import synchronise, temporary_file
+from workers.dataset.location import Location
+from workers.dataset.publication import move, synchronise, temporary_file
 from workers.forecast import LEVEL, Estimate, Forecast
 
 PLAN = "plan.json"
@@ -116,7 +116,7 @@ def _sum(plan: Mapping[str, Any], name: str) -> float:
     return float(sum(entry[name] for entry in plan["spent"]))
 
 
-def _path(dataset: Dataset) -> Path:
+def _path(dataset: Dataset) -> Location:
     return dataset.folder / PLAN
 
 
@@ -137,6 +137,6 @@ def _write(dataset: Dataset, plan: Mapping[str, Any]) -> None:
         with temporary_file(dataset.folder, PLAN) as temporary:
             temporary.write_text(json.dumps(plan, indent=2) + "\n")
             synchronise(temporary)
-            temporary.replace(_path(dataset))
+            move(temporary, _path(dataset))
     except OSError as error:
         say(f"the account of the plan cannot be kept in {_path(dataset)}: {error.strerror}")

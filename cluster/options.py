@@ -1,10 +1,12 @@
 """Options that several commands share."""
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 import typer
 
@@ -13,6 +15,7 @@ from cluster.errors import UsageError, UserError
 from cluster.progress import say
 from cluster.settings_file import load_settings
 from workers import setups
+from workers.dataset.location import Location, location
 from workers.setups import Setup
 from workers.tasks.own_bad import with_bad
 
@@ -35,6 +38,43 @@ def durable(path: Path | None) -> Path | None:
             "give an absolute path that every machine of the cluster sees"
         )
     return path.expanduser().absolute()
+
+
+def dataset_location(text: str) -> Location:
+    """Where a dataset lies: a folder, or `s3://bucket/prefix`.
+
+    What the environment says of the store becomes part of its address, so that every process goes to the same
+    one, wherever it runs. Credentials never do.
+
+    Raises:
+        UsageError: it has a scheme, but is no address of an object store.
+    """
+    try:
+        place = location(text)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    return place.expanduser() if isinstance(place, Path) else place.at(_store_of_environment())
+
+
+def _store_of_environment() -> dict[str, str]:
+    """The options of an address that the standard variables of AWS give, those that are set."""
+    endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL", "")
+    parts = urlsplit(endpoint)
+    options = {
+        "endpoint_override": parts.netloc,
+        "region": os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION", ""),
+        "scheme": parts.scheme,
+    }
+    return {name: value for name, value in options.items() if value}
+
+
+def durable_dataset(text: str) -> Location:
+    """The same; a relative path is refused where `durable` refuses it."""
+    place = dataset_location(text)
+    if isinstance(place, Path):
+        durable(place)
+        return place.absolute()
+    return place
 
 
 Config = Annotated[
@@ -60,7 +100,12 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random d
 SetupName = Annotated[
     str, typer.Option("--setup", help="Robot, controller and task, such as franka, or a module of your own.")
 ]
-DatasetFolder = Annotated[Path, typer.Option("--dataset", help="Folder of the dataset.", callback=durable)]
+DatasetFolder = Annotated[
+    Any,  # a Location, which typer does not know
+    typer.Option(
+        "--dataset", metavar="PLACE", help="Its folder, or s3://bucket/prefix.", parser=durable_dataset
+    ),
+]
 ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.", callback=durable)]
 TrainedModel = Annotated[
     Path | None, typer.Option("--model", help="Folder of a trained model.", callback=durable)

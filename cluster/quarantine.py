@@ -3,15 +3,15 @@
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from workers.dataset.folder import Dataset
+from workers.dataset.location import Location, files
 from workers.dataset.shards import Shard, named
 
 FOLDER = "quarantine"
 
 
-def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Path:
+def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location:
     """Keep the errors of a shard that was given up; the next `collect` tries it afresh."""
     path = _path(dataset, shard)
     path.parent.mkdir(exist_ok=True)
@@ -41,8 +41,8 @@ def release(dataset: Dataset) -> None:
 
 
 def _put_aside(dataset: Dataset) -> Iterator[Shard]:
-    for path in sorted((dataset.folder / FOLDER).glob("*.json")):
-        yield from named(path.stem)
+    for path in files(dataset.folder / FOLDER, "*.json"):
+        yield from named(path.name.removesuffix(".json"))
 
 
 def _is_needed(dataset: Dataset, shard: Shard, episodes: int) -> bool:
@@ -50,5 +50,5 @@ def _is_needed(dataset: Dataset, shard: Shard, episodes: int) -> bool:
     return any(shard.start < other.stop and other.start < shard.stop for other in missing)
 
 
-def _path(dataset: Dataset, shard: Shard) -> Path:
+def _path(dataset: Dataset, shard: Shard) -> Location:
     return dataset.folder / FOLDER / f"{shard.name}.json"

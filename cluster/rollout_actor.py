@@ -1,10 +1,9 @@
 """The rollout process, in a module of its own so that it loads nothing that only the driver needs."""
 
-from pathlib import Path
-
 from workers import setups
 from workers.collection import ShardReport, collect_shard, require_same_code, require_working
 from workers.dataset.folder import open_dataset
+from workers.dataset.location import location
 from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
 from workers.tasks.own_bad import with_bad
@@ -14,7 +13,7 @@ class RolloutActor:
     """A process that rolls out shards of one dataset."""
 
     def __init__(self, setup: str, folder: str) -> None:
-        self._dataset = open_dataset(Path(folder))
+        self._dataset = open_dataset(location(folder))
         self._setup = with_bad(setups.load(setup), self._dataset.identity.bad_name)
         require_same_code(self._setup, self._dataset)
         require_working(self._setup, self._dataset.identity.seed)

@@ -17,6 +17,7 @@ from cluster.session import Session
 from cluster.sweep_job import METHODS, RUNS, TRIALS, Point, run_point
 from cluster.tracking import Run, Tracker
 from cluster.train import planned, trainable
+from workers.dataset.location import Location
 
 TABLE: Final = "sweep.md"
 MINIMUM_EPISODES: Final = 500
@@ -36,7 +37,7 @@ CHANGES: Final[Mapping[str, Mapping[str, Any]]] = {
 
 def sweep(
     *,
-    folder: Path,
+    folder: Location,
     model: Path,
     preset: str,
     seed: int,
@@ -64,7 +65,7 @@ def sweep(
 
 
 def _plan(
-    folder: Path,
+    folder: Location,
     model: Path,
     preset: str,
     seed: int,

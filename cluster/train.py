@@ -18,6 +18,8 @@ from svaedc import checkpoint
 from svaedc.training import require_settings
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.location import Location
+from workers.dataset.object_store import StoreError
 
 MINIMUM_EPISODES = 200
 """Fewer cannot be split into something to learn from and something to measure on."""
@@ -45,7 +47,7 @@ class _Plan:
 
 def train(
     *,
-    folder: Path,
+    folder: Location,
     model: Path,
     preset: str,
     seed: int,
@@ -83,6 +85,8 @@ def _refusals(model: Path) -> Iterator[None]:
         yield
     except LookupError as error:
         raise UsageError(error.args[0]) from error
+    except StoreError as error:
+        raise UserError(str(error)) from error
     except OSError as error:
         raise UserError(
             f"cannot train into {model}: {error}; make room or make it writable and run the same command: "
@@ -92,7 +96,7 @@ def _refusals(model: Path) -> Iterator[None]:
         raise UserError(str(error)) from error
 
 
-def trainable(folder: Path) -> Dataset:
+def trainable(folder: Location) -> Dataset:
     """The dataset of a folder.
 
     Raises:

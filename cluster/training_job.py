@@ -24,6 +24,7 @@ from svaedc.variants import varied
 from svaedc.workplace import ALONE_AT_WORK, Workplace
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
+from workers.dataset.location import Location
 
 MODEL = "model.pt"
 STATE = "training.pt"
@@ -49,7 +50,7 @@ class TrainingJob:
         precision: `auto`, `float32` or `bfloat16`.
     """
 
-    dataset: Path
+    dataset: Location
     model: Path
     cache: Path
     origin: dict[str, Any]
@@ -110,7 +111,7 @@ def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
     return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.controller())
 
 
-def bounds(dataset: Path) -> tuple[list[float], list[float]]:
+def bounds(dataset: Location) -> tuple[list[float], list[float]]:
     """Lower and upper bounds of the dataset's observation channels."""
     channels = open_dataset(dataset).identity.observation
     return [channel[2] for channel in channels], [channel[3] for channel in channels]

@@ -11,6 +11,7 @@ from workers.collection import roll_out
 from workers.dataset import schema
 from workers.dataset.folder import Dataset
 from workers.dataset.inventory import lost
+from workers.dataset.location import fetched
 from workers.dataset.replacement import Repair, replace
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard, sha256
@@ -34,10 +35,11 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Problem]:
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
         _write(setup, dataset, shard, again)
-        if sha256(again) == sha256(dataset.path(shard)):
+        kept = fetched(dataset.path(shard))
+        if sha256(again) == sha256(kept):
             return []
         try:
-            what = _difference(dataset.read(shard), schema.read(again, dataset.identity))
+            what = _difference(schema.read(kept, dataset.identity), schema.read(again, dataset.identity))
         except ValueError as error:
             what = str(error)
     return [Problem(shard.name, what)]

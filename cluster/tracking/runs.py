@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from urllib.parse import urlsplit
 
 from mlflow import MlflowClient
 from mlflow.entities import Dataset, DatasetInput, InputTag, LifecycleStage, Metric, Param, RunTag
@@ -19,6 +20,7 @@ from mlflow.protos.databricks_pb2 import RESOURCE_DOES_NOT_EXIST, ErrorCode
 from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.errors import UserError
+from workers.dataset.location import Location
 
 UI_PORT = 5000
 """Where `svaedc ui` serves a SQLite store unless told otherwise; a run's link points there."""
@@ -78,16 +80,17 @@ class Run:
         with self.tracker.reaching():
             self.tracker.client.log_dict(self.id, {**content}, f"{name}.json")
 
-    def dataset(self, name: str, fingerprint: str, path: Path) -> None:
+    def dataset(self, name: str, fingerprint: str, path: Location) -> None:
         """Records a dataset as the run's input.
 
         Args:
             name: what MLflow lists it as.
             fingerprint: the dataset's hash; MLflow shows its first 36 characters as the digest.
-            path: the dataset's folder.
+            path: where the dataset lies.
         """
-        source = json.dumps({"uri": path.resolve().as_uri()})
-        used = Dataset(name, fingerprint[:DIGEST_LENGTH], "local", source)
+        uri = path.resolve().as_uri()
+        kind = {"file": "local"}.get(urlsplit(uri).scheme, "s3")
+        used = Dataset(name, fingerprint[:DIGEST_LENGTH], kind, json.dumps({"uri": uri}))
         with self.tracker.reaching():
             context = [InputTag("mlflow.data.context", "training")]
             self.tracker.client.log_inputs(self.id, [DatasetInput(used, context)])

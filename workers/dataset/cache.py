@@ -13,6 +13,7 @@ from jaxtyping import Float32, Int64
 
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
+from workers.dataset.location import Location
 from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns
 from workers.rollout import DIVERGED, degrees
@@ -172,7 +173,7 @@ def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarra
     }
 
 
-def _require_finite(rows: Mapping[str, np.ndarray], path: Path) -> None:
+def _require_finite(rows: Mapping[str, np.ndarray], path: Location) -> None:
     """Refuse what would turn the model's every weight into NaN many updates later."""
     for name in ("x", "xi", "bad", "y", "f"):
         strange = ~np.isfinite(rows[name]).reshape(len(rows[name]), -1).all(axis=1)

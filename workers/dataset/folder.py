@@ -1,27 +1,24 @@
-"""A dataset: a folder of shards that share one identity."""
+"""A dataset: shards in one place that share one identity."""
 
 import hashlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 from workers.dataset import shards
 from workers.dataset.identity import Identity
-from workers.dataset.publication import link, synchronise, temporary_file
+from workers.dataset.location import Location, fetched
+from workers.dataset.manifest import MANIFEST, begun, manifest_text
 from workers.dataset.schema import Columns, read, read_stops
 from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, Episode
-
-MANIFEST = "dataset.json"
 
 
 @dataclass(frozen=True)
 class Dataset:
     """An open dataset: where it lies, and what it is."""
 
-    folder: Path
+    folder: Location
     identity: Identity
 
     def shards(self) -> list[Shard]:
@@ -55,15 +52,16 @@ class Dataset:
 
     def size(self) -> int:
         """Bytes of the finished shards."""
-        return sum(self.path(shard).stat().st_size for shard in self.shards())
+        files = (path for path in self.folder.iterdir() if any(shards.named(path.name)))
+        return sum(path.stat().st_size for path in files)
 
-    def path(self, shard: Shard) -> Path:
+    def path(self, shard: Shard) -> Location:
         """The file of a shard."""
         return self.folder / shard.name
 
     def read(self, shard: Shard) -> Columns:
         """The episodes of a shard; a damaged file raises `ValueError`."""
-        return read(self.path(shard), self.identity)
+        return read(fetched(self.path(shard)), self.identity)
 
     def episode(self, index: int) -> Episode:
         """One episode, as it was recorded.
@@ -81,8 +79,9 @@ class Dataset:
     def fingerprint(self) -> str:
         """SHA-256 over the identity and the recorded digest of every shard: the same for the same bytes."""
         digest = hashlib.sha256(self.identity.digest.encode())
-        for shard in self.shards():
-            digest.update(f"{shard.name} {shards.recorded_digest(self.folder, shard)}\n".encode())
+        present = self.shards()
+        for shard, recorded in zip(present, shards.recorded_digests(self.folder, present), strict=True):
+            digest.update(f"{shard.name} {recorded}\n".encode())
         return digest.hexdigest()
 
     def batches(self) -> Iterator[tuple[Shard, Columns]]:
@@ -91,20 +90,14 @@ class Dataset:
             yield shard, self.read(shard)
 
 
-def create(folder: Path, identity: Identity) -> Dataset:
+def create(folder: Location, identity: Identity) -> Dataset:
     """Open the dataset in a folder, or begin it there.
 
     Raises:
         ValueError: when the folder holds a dataset of another identity, naming the fields that differ.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    manifest = folder / MANIFEST
-    if not manifest.exists():
-        with temporary_file(folder, MANIFEST) as temporary:
-            temporary.write_text(manifest_text(identity))
-            synchronise(temporary)
-            link(temporary, manifest)
-    dataset = open_dataset(folder)
+    dataset = _opened(folder, begun(folder, manifest_text(identity)))
     differences = dataset.identity.differences(identity)
     if differences:
         raise ValueError(
@@ -115,12 +108,7 @@ def create(folder: Path, identity: Identity) -> Dataset:
     return dataset
 
 
-def manifest_text(identity: Identity) -> str:
-    """The content of `dataset.json`."""
-    return json.dumps(json.loads(identity.to_json()), indent=2) + "\n"
-
-
-def open_dataset(folder: Path) -> Dataset:
+def open_dataset(folder: Location) -> Dataset:
     """Open an existing dataset.
 
     Raises:
@@ -129,7 +117,11 @@ def open_dataset(folder: Path) -> Dataset:
     manifest = folder / MANIFEST
     if not manifest.exists():
         raise ValueError(f"{folder} holds no dataset: there is no {MANIFEST} in it")
+    return _opened(folder, manifest.read_bytes())
+
+
+def _opened(folder: Location, manifest: bytes) -> Dataset:
     try:
-        return Dataset(folder, Identity.from_json(manifest.read_text()))
+        return Dataset(folder, Identity.from_json(manifest.decode()))
     except ValueError as error:
-        raise ValueError(f"{manifest} is damaged or of another version: {error}") from error
+        raise ValueError(f"{folder / MANIFEST} is damaged or of another version: {error}") from error

@@ -1,11 +1,12 @@
 """Whether a folder holds the files of its dataset and no others that could be taken for them."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
-from workers.dataset.folder import MANIFEST, Dataset, manifest_text
+from workers.dataset.folder import Dataset
+from workers.dataset.location import Location, files
+from workers.dataset.manifest import MANIFEST, manifest_text
 from workers.dataset.publication import WRITING
-from workers.dataset.shards import Shard, named, recorded_digest, sha256
+from workers.dataset.shards import Shard, missing, named, recorded_digest, sha256
 from workers.dataset.verification import Problem
 
 _DIGEST = ".sha256"
@@ -14,7 +15,7 @@ _DIGEST = ".sha256"
 def inventory(dataset: Dataset) -> Iterator[Problem]:
     """What is wrong with the folder, beside what is in its shards; nothing is changed or deleted."""
     yield from _manifest_problems(dataset)
-    for path in sorted(dataset.folder.glob("*.parquet")):
+    for path in files(dataset.folder, "*.parquet"):
         if not list(named(path.name)):
             yield Problem(path.name, f"no shard has such a name, {_whose(dataset, path)}")
     for shard in lost(dataset):
@@ -55,7 +56,7 @@ def _manifest_problems(dataset: Dataset) -> Iterator[Problem]:
         yield Problem(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
 
 
-def _whose(dataset: Dataset, path: Path) -> str:
+def _whose(dataset: Dataset, path: Location) -> str:
     """Whether a strange file is a copy; readers of all Parquet files would see its episodes as well."""
     digest = sha256(path)
     for shard in dataset.shards():
@@ -65,14 +66,20 @@ def _whose(dataset: Dataset, path: Path) -> str:
 
 
 def _digests_alone(dataset: Dataset) -> list[tuple[Shard, bool]]:
-    """Shards without a file, and whether other files hold all of their episodes."""
+    """Shards without a file, and whether other files hold all of their episodes.
+
+    All from one look at the folder: a shard that appears meanwhile must not count as one of the others.
+    """
+    there = {path.name for path in dataset.folder.iterdir()}
     alone = [
         shard
-        for path in sorted(dataset.folder.glob(f"*.parquet{_DIGEST}"))
-        for shard in named(path.name.removesuffix(_DIGEST))
-        if not dataset.path(shard).exists()
+        for name in sorted(there)
+        if name.endswith(_DIGEST) and name.removesuffix(_DIGEST) not in there
+        for shard in named(name.removesuffix(_DIGEST))
     ]
-    uncovered = dataset.missing(max((shard.stop for shard in alone), default=0))
+    present = [shard for name in there for shard in named(name)]
+    stop = max((shard.stop for shard in alone), default=0)
+    uncovered = list(missing(present, stop, dataset.identity.episodes_per_shard))
     return [
         (shard, not any(shard.start < gap.stop and gap.start < shard.stop for gap in uncovered))
         for shard in alone

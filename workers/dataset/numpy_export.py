@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from workers.dataset.folder import MANIFEST, Dataset, manifest_text
+from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
+from workers.dataset.manifest import MANIFEST, manifest_text
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
 

@@ -1,4 +1,8 @@
-"""How a file comes to be, once and whole: written under its writer's name, then linked to its own."""
+"""How a file comes to be, once and whole.
+
+On a disk it is written under its writer's name, then linked to its own. In an object store it is put there by
+one request, which leaves nothing if it fails; until then it exists in its writer's memory only.
+"""
 
 import os
 import re
@@ -8,6 +12,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from workers.dataset.location import Location
+
 WRITING = ".writing"
 """Folder, below the dataset, of files that are not finished."""
 
@@ -15,8 +21,12 @@ _WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)")
 
 
 @contextmanager
-def temporary_file(folder: Path, name: str) -> Iterator[Path]:
+def temporary_file(folder: Location, name: str) -> Iterator[Path]:
     """A path for a file of this writer that is not finished; whatever lies there is removed at the end."""
+    if not isinstance(folder, Path):
+        with _file_in_memory(name) as temporary:
+            yield temporary
+        return
     writing = folder / WRITING
     writing.mkdir(exist_ok=True)
     temporary = writing / f"{name}.{writer()}"
@@ -26,15 +36,41 @@ def temporary_file(folder: Path, name: str) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def link(source: Path, target: Path) -> None:
-    """Give a finished file its final name, durably, unless another writer was first."""
-    with suppress(FileExistsError):
-        os.link(source, target)
-    synchronise(target.parent)
+@contextmanager
+def _file_in_memory(name: str) -> Iterator[Path]:
+    """A file that ends with this process, however that ends."""
+    handle = os.memfd_create(name)
+    try:
+        yield Path(f"/proc/self/fd/{handle}")
+    finally:
+        os.close(handle)
 
 
-def synchronise(path: Path) -> None:
-    """Wait until a file's bytes, or a folder's names, are on disk."""
+def link(source: Location, target: Location) -> None:
+    """Give a finished file its final name, durably, unless another writer was first.
+
+    In an object store two writers at the same moment may both write, so the bytes must be the same.
+    """
+    if isinstance(source, Path) and isinstance(target, Path):
+        with suppress(FileExistsError):
+            os.link(source, target)
+        synchronise(target.parent)
+    elif not target.exists():
+        target.write_bytes(source.read_bytes())
+
+
+def move(source: Path, target: Location) -> None:
+    """Let a finished file take the place of what has its final name."""
+    if isinstance(target, Path):
+        source.replace(target)
+    else:
+        target.write_bytes(source.read_bytes())
+
+
+def synchronise(path: Location) -> None:
+    """Wait until a file's bytes, or a folder's names, are on disk; objects are safe once they are there."""
+    if not isinstance(path, Path):
+        return
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 
-from workers.dataset.publication import link, synchronise, temporary_file
+from workers.dataset.location import Location
+from workers.dataset.publication import link, move, synchronise, temporary_file
 from workers.dataset.shards import Shard, digest_line, digest_path, sha256
 
 REPLACED = ".replaced"
@@ -19,7 +20,7 @@ class Repair(Enum):
     DIGEST = "was whole; its .sha256 file has been written anew"
 
 
-def replace(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Repair:
+def replace(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Repair:
     """Write a shard anew; its name holds the old bytes or the new ones at every moment, never others.
 
     A file that holds the new bytes already is not touched.
@@ -44,12 +45,12 @@ def replace(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Repair
         if is_there:
             keep_aside(folder, target)
         _write_digest(folder, shard, digest)
-        temporary.replace(target)
+        move(temporary, target)
         synchronise(folder)
         return Repair.REPLACED if is_there else Repair.ADDED
 
 
-def keep_aside(folder: Path, path: Path) -> Path:
+def keep_aside(folder: Location, path: Location) -> Location:
     """Give a file a second name in `.replaced`, with the start of its SHA-256; equal bytes are kept once."""
     aside = folder / REPLACED
     aside.mkdir(exist_ok=True)
@@ -58,10 +59,10 @@ def keep_aside(folder: Path, path: Path) -> Path:
     return kept
 
 
-def _write_digest(folder: Path, shard: Shard, digest: str) -> None:
+def _write_digest(folder: Location, shard: Shard, digest: str) -> None:
     target = digest_path(folder, shard)
     with temporary_file(folder, target.name) as temporary:
         temporary.write_text(digest_line(shard, digest))
         synchronise(temporary)
-        temporary.replace(target)
+        move(temporary, target)
         synchronise(folder)

@@ -14,6 +14,8 @@ import pyarrow.parquet as pq
 from jaxtyping import Float32, Float64, Int64, UInt8
 
 from workers.dataset.identity import Identity
+from workers.dataset.location import Location, source
+from workers.dataset.object_store import refusal
 from workers.dataset.quantisation import described, restored, stored
 from workers.rollout import Episode
 
@@ -167,20 +169,20 @@ def _lists(arrays: Sequence[np.ndarray], kind: pa.DataType) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(flat, type=kind.value_type), type=kind)
 
 
-def read_identity(path: Path) -> Identity:
+def read_identity(path: Location) -> Identity:
     """The identity in a file's own metadata.
 
     Raises:
         ValueError: when the file is no Parquet file of this project.
     """
     with _damage_named(path):
-        metadata = pq.read_schema(path).metadata or {}
+        metadata = pq.read_schema(source(path)).metadata or {}
     if b"svaedc.identity" not in metadata:
         raise ValueError(f"{path} holds no episodes of this project: its metadata lacks svaedc.identity")
     return Identity.from_json(metadata[b"svaedc.identity"].decode())
 
 
-def read(path: Path, identity: Identity) -> Columns:
+def read(path: Location, identity: Identity) -> Columns:
     """The episodes of a file, every page checked against its checksum.
 
     Raises:
@@ -200,7 +202,7 @@ def read(path: Path, identity: Identity) -> Columns:
     )
 
 
-def read_outcomes(path: Path, identity: Identity) -> Outcomes:
+def read_outcomes(path: Location, identity: Identity) -> Outcomes:
     """How the episodes of a file went; the large columns are not read.
 
     Raises:
@@ -215,31 +217,33 @@ def read_outcomes(path: Path, identity: Identity) -> Outcomes:
     )
 
 
-def _table(path: Path, identity: Identity, names: list[str]) -> pa.Table:
+def _table(path: Location, identity: Identity, names: list[str]) -> pa.Table:
     """Columns of a file, every page of them checked against its checksum."""
     with _damage_named(path):
-        file = pq.ParquetFile(path, page_checksum_verification=True)
+        file = pq.ParquetFile(source(path), page_checksum_verification=True, pre_buffer=True)
         if not file.schema_arrow.equals(schema(identity)):
             raise ValueError(f"{path} has other columns than schema version {identity.schema_version}")
         return file.read(columns=names)
 
 
-def read_stops(path: Path) -> tuple[str, ...]:
+def read_stops(path: Location) -> tuple[str, ...]:
     """The stop reasons of a file's episodes, without reading the rest.
 
     Raises:
         ValueError: when the file is damaged.
     """
     with _damage_named(path):
-        return tuple(pq.read_table(path, columns=["stop"])["stop"].to_pylist())
+        return tuple(pq.read_table(source(path), columns=["stop"])["stop"].to_pylist())
 
 
 @contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
+def _damage_named(path: Location) -> Iterator[None]:
+    """A store that is away says nothing about the file."""
     try:
         yield
     except (pa.ArrowException, OSError) as error:
-        raise ValueError(f"{path} is damaged or no Parquet file: {error}") from error
+        damage = ValueError(f"{path} is damaged or no Parquet file: {error}")
+        raise refusal(path, error) or damage from error
 
 
 def _dense(column: pa.ChunkedArray, shape: tuple[int, ...]) -> Any:

@@ -3,13 +3,16 @@
 import hashlib
 import re
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from workers.dataset.publication import WRITING, is_dead, link, synchronise, temporary_file
+from workers.dataset.location import Location, fetched
+from workers.dataset.publication import WRITING, is_dead, link, move, synchronise, temporary_file
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")
 _BLOCK = 1 << 20
+_READERS = 8
 
 
 @dataclass(frozen=True, order=True)
@@ -35,7 +38,7 @@ class Shard:
         return self.stop - self.start
 
 
-def present(folder: Path) -> list[Shard]:
+def present(folder: Location) -> list[Shard]:
     """The finished shards of a dataset, in order."""
     return sorted(shard for path in folder.iterdir() for shard in named(path.name))
 
@@ -65,10 +68,10 @@ def missing(shards: Iterable[Shard], episodes: int, per_shard: int) -> Iterator[
             covered = end
 
 
-def commit(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Path:
-    """Write a shard under a temporary name and publish it whole; the first of several writers wins.
+def commit(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Location:
+    """Write a shard aside and publish it whole; the first of several writers wins.
 
-    The file and its SHA-256 are on disk before its name appears, and the name is on disk before this returns.
+    The file and its SHA-256 are safe before its name appears, and the name is safe before this returns.
 
     Args:
         folder: of the dataset.
@@ -83,7 +86,7 @@ def commit(folder: Path, shard: Shard, write: Callable[[Path], None]) -> Path:
     return folder / shard.name
 
 
-def digest_path(folder: Path, shard: Shard) -> Path:
+def digest_path(folder: Location, shard: Shard) -> Location:
     """Where the SHA-256 of a shard is kept, in the format of `sha256sum`."""
     return folder / f"{shard.name}.sha256"
 
@@ -93,23 +96,31 @@ def digest_line(shard: Shard, digest: str) -> str:
     return f"{digest}  {shard.name}\n"
 
 
-def recorded_digest(folder: Path, shard: Shard) -> str:
+def recorded_digest(folder: Location, shard: Shard) -> str:
     """The SHA-256 written beside a shard; "" when there is none."""
-    path = digest_path(folder, shard)
-    words = path.read_text(errors="replace").split() if path.exists() else []
+    try:
+        words = digest_path(folder, shard).read_text(errors="replace").split()
+    except FileNotFoundError:
+        return ""
     return words[0] if words else ""
 
 
-def sha256(path: Path) -> str:
+def recorded_digests(folder: Location, shards: Iterable[Shard]) -> Iterator[str]:
+    """The same for many, asked for several at a time: an object store takes its time for each."""
+    with ThreadPoolExecutor(_READERS) as readers:
+        yield from readers.map(lambda shard: recorded_digest(folder, shard), shards)
+
+
+def sha256(path: Location) -> str:
     """SHA-256 of a file's bytes."""
     digest = hashlib.sha256()
-    with path.open("rb") as file:
+    with fetched(path).open("rb") as file:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
 
 
-def sweep(folder: Path) -> int:
+def sweep(folder: Location) -> int:
     """Remove unfinished files whose writer is known to be dead; returns how many."""
     writing = folder / WRITING
     dead = [path for path in writing.iterdir() if is_dead(path.name)] if writing.exists() else []
@@ -118,11 +129,11 @@ def sweep(folder: Path) -> int:
     return len(dead)
 
 
-def _publish_digest(folder: Path, shard: Shard, digest: str) -> None:
+def _publish_digest(folder: Location, shard: Shard, digest: str) -> None:
     """Before the shard itself, so that no shard is without one; a shard already there keeps its own."""
     target = digest_path(folder, shard)
     with temporary_file(folder, target.name) as temporary:
         temporary.write_text(digest_line(shard, digest))
         synchronise(temporary)
         if not (folder / shard.name).exists():
-            temporary.replace(target)
+            move(temporary, target)

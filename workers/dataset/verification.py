@@ -9,7 +9,8 @@ import numpy as np
 from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
-from workers.dataset.schema import Columns, read_identity
+from workers.dataset.location import Location, fetched
+from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
@@ -49,7 +50,8 @@ def overlaps(dataset: Dataset) -> list[Problem]:
 
 def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
     """What is wrong with a shard in itself, whatever lies beside it."""
-    found = chain(_byte_problems(dataset, shard), _row_problems(dataset, shard))
+    path = fetched(dataset.path(shard))
+    found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
     return [Problem(shard.name, what) for what in found]
 
 
@@ -62,25 +64,25 @@ def gaps(dataset: Dataset) -> Iterator[Shard]:
         reached = max(reached, shard.stop)
 
 
-def _byte_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
+def _byte_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[str]:
     digest_path = shards.digest_path(dataset.folder, shard)
     recorded = shards.recorded_digest(dataset.folder, shard)
     if not recorded:
         yield "its .sha256 file is missing"
         return
-    if shards.sha256(dataset.path(shard)) != recorded:
+    if shards.sha256(path) != recorded:
         yield "its bytes differ from its .sha256 file"
     elif digest_path.read_text(errors="replace") != shards.digest_line(shard, recorded):
         yield "its .sha256 file is not as `sha256sum` writes it"
 
 
-def _row_problems(dataset: Dataset, shard: Shard) -> Iterator[str]:
+def _row_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[str]:
     try:
-        differences = dataset.identity.differences(read_identity(dataset.path(shard)))
+        differences = dataset.identity.differences(read_identity(path))
         if differences:
             yield f"it belongs to another dataset: {'; '.join(differences)}"
             return
-        columns = dataset.read(shard)
+        columns = read(path, dataset.identity)
     except ValueError as error:
         yield str(error)
         return
