@@ -201,4 +201,5 @@ def motions(folder: Path, tellings: Sequence[Telling], setup: Setup, count: int)
 
 
 def badness_note(y: float) -> str:
+    """What is written at the top right; nothing where the model knows nothing of badness."""
     return "" if math.isnan(y) else f"bad {y:.0%}"
