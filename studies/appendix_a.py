@@ -141,7 +141,8 @@ def main() -> None:
     note = (
         f"\n{dataset.identity.setup}, fingerprint {dataset.fingerprint()[:12]}, the first {given.episodes} "
         f"training episodes, {len(cache.held_out())} held out; networks of `{given.networks}`, the plain "
-        f"bound, {given.updates} updates of each stage, seeds 0 to {given.seeds - 1}; ± is the standard deviation.\n"
+        f"bound, {given.updates} updates of each stage, seeds 0 to {given.seeds - 1}; ± is the standard "
+        "deviation.\n"
     )
     written(given.out / "table.md", table(["arm", "collapsed", *COLUMNS.values()], rows) + note)
 

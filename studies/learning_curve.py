@@ -109,8 +109,8 @@ def main() -> None:
     note = (
         f"\n{dataset.identity.setup}, fingerprint {dataset.fingerprint()[:12]}, {given.updates} updates, "
         f"seed {given.seed}, {len(cache.held_out())} held-out episodes. Over the last doublings the "
-        f"generated error changes by {slope:+.3f} each; if it went on like this, {FAR:,} episodes would leave "
-        f"{far:.2f}.\n"
+        f"generated error changes by {slope:+.3f} each; if it went on like this, {FAR:,} episodes would "
+        f"leave {far:.2f}.\n"
     )
     draw(given.out / "figure.png", cells, found)
     written(given.out / "table.md", table(["episodes", *COLUMNS.values()], rows) + note)
