@@ -100,8 +100,13 @@ def _computed(missing: Sequence[Any], compute: Callable[[Any], Result], processe
 
 
 def _brief(result: Result) -> str:
-    numbers = {key: value for key, value in result.items() if isinstance(value, float)}
-    return ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
+    parts = []
+    for key, value in result.items():
+        if isinstance(value, Mapping):
+            parts.append(f"{key}: {_brief(value)};")
+        elif isinstance(value, float):
+            parts.append(f"{key} {value:.3g}")
+    return " ".join(parts)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
