@@ -34,7 +34,7 @@ class Cost:
 @dataclass(frozen=True)
 class _Episode:
     seconds: float
-    size: float  # bytes
+    size: int  # bytes
 
 
 _EPISODES: Final[Mapping[str, _Episode]] = MappingProxyType(
@@ -73,10 +73,10 @@ def collecting(setup: str, episodes: int, cores: int) -> Cost:
     """Rolling out and storing episodes."""
     one = _EPISODES[setup]
     seconds = one.seconds * episodes
-    return Cost(seconds, seconds / cores, one.size * episodes)
+    return Cost(seconds, seconds / cores, float(one.size * episodes))
 
 
-def training(setup: str, preset: str, latent: str, updates: int, cache: float) -> Cost:
+def training(setup: str, preset: str, latent: str, updates: int, cache: int) -> Cost:
     """Gradient updates, on one thread; a GPU or further threads make them faster.
 
     Args:
@@ -87,7 +87,7 @@ def training(setup: str, preset: str, latent: str, updates: int, cache: float) -
         cache: bytes of the decoded episodes.
     """
     seconds = _UPDATES[setup, preset, latent] * updates
-    return Cost(seconds, seconds, cache)
+    return Cost(seconds, seconds, float(cache))
 
 
 def comparing(setup: str, methods: Iterable[str], runs: Mapping[str, float], trials: int, slots: int) -> Cost:
