@@ -3,14 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-SOURCES := workers svaedc cluster tests $(wildcard benchmarks examples)
+SOURCES := workers svaedc cluster tests $(wildcard benchmarks examples studies)
 
 # Nothing here reports home.
 export RAY_USAGE_STATS_ENABLED := 0
 export MLFLOW_DISABLE_TELEMETRY := true
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test test-slow chaos bench check format clean
+.PHONY: help install demo test test-slow chaos bench studies check format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
@@ -37,6 +37,11 @@ chaos: $(STAMP) ## the tests that kill processes on purpose
 
 bench: $(STAMP) ## measure speed and memory; prints ratios
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+DATASET ?= data/franka
+studies: $(STAMP) ## the learning curve and appendix A on DATASET=data/franka; hours, and goes on where it was
+	$(BIN)/python -m studies.learning_curve --dataset $(DATASET)
+	$(BIN)/python -m studies.appendix_a --dataset $(DATASET)
 
 check: $(STAMP) ## ruff, mypy and the import contracts
 	$(BIN)/ruff check $(SOURCES)

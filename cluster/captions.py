@@ -5,6 +5,7 @@ from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
 RED = (206, 32, 41)
+TITLE = 20  # pixels; even, as an .mp4 asks
 _INK, _PAPER = (20, 24, 32), (250, 250, 250)
 
 
@@ -30,6 +31,14 @@ def captioned(
         draw.rectangle((0, 0, width - 1, height - 1), outline=RED, width=edge)
         _write(draw, (near, height - near), "ld", ", ".join(conditions).replace("_", " "), RED)
     return np.asarray(image)
+
+
+def headed(picture: UInt8[np.ndarray, "height width 3"], title: str) -> UInt8[np.ndarray, "taller width 3"]:
+    """The picture below a white strip with a title, which is cut where it is wider."""
+    font = ImageFont.load_default(TITLE // 2 + 2)
+    strip = Image.new("RGB", (picture.shape[1], TITLE), _PAPER)
+    ImageDraw.Draw(strip).text((4, TITLE // 2), title, fill=_INK, font=font, anchor="lm")
+    return np.concatenate([np.asarray(strip), picture])
 
 
 def _write(

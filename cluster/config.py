@@ -14,6 +14,7 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
+    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
 )
@@ -94,6 +95,8 @@ class TrainSettings(Section):
     """`auto` takes a GPU for each process where the cluster has any; `cuda` refuses to do without."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """Of matrix products; `auto` is bfloat16 on a GPU that has it, and float32 elsewhere."""
+    moments: NonNegativeInt = 10
+    """Pictures of each trajectory in the clip of the trained model's motions; 0 for no clip and no stills."""
     balance: Literal["none", "y", "f"] = "none"
     """Show episodes of every tenth of the range of y or f equally often; for skewed data."""
     model: Literal["preset", "svae-dc", "svae"] = "preset"

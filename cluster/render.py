@@ -4,14 +4,16 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from cluster.captions import captioned
 from cluster.errors import UsageError
-from cluster.film import Picture
+from cluster.film import Picture, require_writable
+from cluster.options import usage_errors
 from cluster.progress import ProgressLine
-from workers.pictures import Size, frames
+from workers.pictures import Size, frames, scenery_of
 from workers.rollout import Episode
 from workers.setups import Setup
 
@@ -24,6 +26,22 @@ class Moment:
 
     step: int
     conditions: tuple[str, ...]
+
+
+def drawable(setup: Setup, out: Path, width: int, height: int) -> Size:
+    """The size of each picture, once it is clear that there is something to see and that it can be written.
+
+    Raises:
+        UsageError: the size or the kind of the file is impossible, or there is nothing to see.
+    """
+    try:
+        size = Size(width, height)
+    except ValueError as error:
+        raise UsageError(f"{error}; change --width or --height") from error
+    require_writable(out, width, height)
+    with usage_errors():
+        scenery_of(setup)
+    return size
 
 
 def usual_speed(setup: Setup) -> float:

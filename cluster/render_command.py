@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cluster.errors import UsageError
-from cluster.options import SetupName, durable, setup_of, usage_errors
+from cluster.options import SetupName, TrainedModel, durable, setup_of
 from cluster.progress import say
 
 X_HELP = "random:SEED, dataset:FOLDER:INDEX, an .npy file, or D numbers in [0, 1] separated by commas."
@@ -26,6 +25,7 @@ def render(
     stills: Annotated[int, typer.Option("--stills", min=1, max=60, help="Pictures of a .png.")] = 6,
     width: Annotated[int, typer.Option("--width", help="Pixels of each picture.")] = 360,
     height: Annotated[int, typer.Option("--height", help="Pixels of each picture.")] = 270,
+    model: TrainedModel = None,
 ) -> None:
     """Show an episode of any setup as a clip or as stills; needs no screen.
 
@@ -39,30 +39,31 @@ def render(
 
     Your own controller, under other physics, as fast as life: `svaedc render --setup daisy-11d --x best.npy
     --seed 3 --speed 1 --out walk.mp4`
+
+    An episode beside what a trained model reconstructs of it, and generates from its controller alone:
+    `svaedc render --setup franka --x dataset:data/franka:12 --model models/franka --out told.gif`
     """
     from cluster.exhibit import exhibit
     from cluster.files import replacing
-    from cluster.film import STILLS, require_writable, write
-    from cluster.render import clip, pictures, summary, usual_speed
+    from cluster.film import STILLS, write
+    from cluster.motions import beside
+    from cluster.render import clip, drawable, pictures, summary, usual_speed
     from cluster.render import stills as chosen_stills
-    from workers.pictures import Size, scenery_of
 
     robot = setup_of(setup)
-    try:
-        size = Size(width, height)
-    except ValueError as error:
-        raise UsageError(f"{error}; change --width or --height") from error
-    require_writable(out, width, height)
-    with usage_errors():
-        scenery_of(robot)
+    size = drawable(robot, out, width, height)
     pace = usual_speed(robot) if speed is None else speed
     episode = exhibit(x, robot, seed)
     if out.suffix in STILLS:
         moments, note = chosen_stills(robot, episode, stills), robot.name
     else:
         moments, note = clip(robot, episode, pace, fps), f"{robot.name} {pace:.2g}x"
+    if model is None:
+        drawn = pictures(robot, episode, moments, size, note)
+    else:
+        drawn = beside(robot, episode, model, moments, size, out.suffix)
     out.parent.mkdir(parents=True, exist_ok=True)
     with replacing(out) as unfinished:
-        write(unfinished, out.suffix, pictures(robot, episode, moments, size, note), fps)
+        write(unfinished, out.suffix, drawn, fps)
     say(summary(robot, episode))
     say(f"wrote {out}: {len(moments)} pictures, {out.stat().st_size / 1e3:.0f} kB")

@@ -71,7 +71,7 @@ def train(
         with _refusals(model), _run(plan, tracker, settings) as run:
             if trained < plan.updates:
                 _submit(plan, settings, session, run)
-            summary = record(plan.job, plan.cache, plan.dataset, run)
+            summary = record(plan.job, plan.cache, plan.dataset, run, settings.moments)
     judge(summary, plan.updates)
     return model / MODEL
 

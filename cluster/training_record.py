@@ -10,10 +10,12 @@ from typing import Any
 from cluster import figures, latent_figures
 from cluster.errors import UserError
 from cluster.files import replacing
+from cluster.motions import remarkable_motions
 from cluster.progress import say
 from cluster.tracking import Run, log_model
 from cluster.training_job import MODEL, TrainingJob, episodes
 from svaedc import checkpoint, diagnostics
+from svaedc.model import SvaeDc
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset
 
@@ -22,8 +24,17 @@ FULL_SIZE = 10_000
 """From here on a collapsed model is an error; below, it is expected often enough to be only reported."""
 
 
-def record(job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run) -> dict[str, Any]:
+def record(
+    job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run, moments: int
+) -> dict[str, Any]:
     """Measure the model on all held-out episodes and keep what is found.
+
+    Args:
+        job: that made the model.
+        cache: that it was trained on.
+        dataset: of the cache.
+        run: of the training.
+        moments: in the clip of the model's motions; 0 for none.
 
     Returns:
         What `metrics.json` holds: `metrics`, `collapsed` ("" or why), `episodes`, and the model's metadata.
@@ -36,12 +47,9 @@ def record(job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run) -
     _, held_out = episodes(cache)
     metrics = diagnostics.evaluate(model, held_out)
     collapsed = diagnostics.collapse(metrics) or ""
-    pictures = [
-        figures.reconstruction(job.model / "reconstruction.png", model, held_out, dataset.identity),
-        latent_figures.latent_space(job.model / "latent-space.png", model, held_out, cache.f[held_out.rows]),
-    ]
-    if model.config.has_psi:
-        pictures.append(latent_figures.badness(job.model / "badness.png", model, held_out))
+    pictures = _pictures(job, model, cache, dataset)
+    if moments:
+        pictures += remarkable_motions(job.model, model, dataset, cache, job.stride, moments)
     summary = {"metrics": metrics, "collapsed": collapsed, "episodes": len(cache.episode), **metadata}
     run.metrics({f"final/{name}": value for name, value in metrics.items()}, step=metadata["update"])
     for picture in pictures:
@@ -59,6 +67,17 @@ def record(job: TrainingJob, cache: TrainingCache, dataset: Dataset, run: Run) -
         f"{model.config.tau_size} latent dimensions active; {run.url}"
     )
     return summary
+
+
+def _pictures(job: TrainingJob, model: SvaeDc, cache: TrainingCache, dataset: Dataset) -> list[Path]:
+    _, held_out = episodes(cache)
+    pictures = [
+        figures.reconstruction(job.model / "reconstruction.png", model, held_out, dataset.identity),
+        latent_figures.latent_space(job.model / "latent-space.png", model, held_out, cache.f[held_out.rows]),
+    ]
+    if model.config.has_psi:
+        pictures.append(latent_figures.badness(job.model / "badness.png", model, held_out))
+    return pictures
 
 
 def recorded(folder: Path, update: int) -> dict[str, Any] | None:

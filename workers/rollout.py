@@ -177,6 +177,11 @@ def degrees(
     return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
 
 
+def sampled(horizon: int, stride: int) -> slice:
+    """The steps that a model sees of an episode: the last one of every whole stride."""
+    return slice(stride - 1, horizon // stride * stride, stride)
+
+
 def _stored(is_bad: Bad) -> Stored:
     """Degrees as they are; otherwise one bit per condition, the first condition lowest."""
     return is_bad[0] if is_bad.dtype == np.float32 else np.packbits(is_bad, axis=0, bitorder="little")[0]

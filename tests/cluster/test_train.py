@@ -21,7 +21,7 @@ from svaedc import checkpoint
 
 def settings(cache: Path, **changes) -> TrainSettings:
     return TrainSettings(
-        **{"updates": 40, "epoch_updates": 20, "threads": 1, "cache_folder": cache, **changes}
+        **{"updates": 40, "epoch_updates": 20, "threads": 1, "moments": 0, "cache_folder": cache, **changes}
     )
 
 
@@ -91,7 +91,7 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     run_train, tracking_settings, capsys
 ):
     before = signal.getsignal(signal.SIGINT)
-    path = run_train()
+    path = run_train(moments=1)
     assert signal.getsignal(signal.SIGINT) is before
     model, metadata = checkpoint.load(path)
     assert metadata["setup"] == "franka"
@@ -106,6 +106,8 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     assert steps == [20, 40]
     assert run.inputs.dataset_inputs[0].dataset.name == "franka"
     assert {artifact.path for artifact in client.list_artifacts(run.info.run_id)} >= {"figures", "model.pt"}
+    figures = {artifact.path for artifact in client.list_artifacts(run.info.run_id, "figures")}
+    assert figures >= {"figures/motions.gif", "figures/motions.png"}
     assert run.data.tags["svaedc.device"] == "cpu (1 threads), float32"
     while_it_trains = ("log_p_xi", "log_p_y", "log_p_latent", "minus_log_q", "mae_y_gen", "latent_spread/08")
     assert {f"held_out/{name}" for name in while_it_trains} <= run.data.metrics.keys()
@@ -119,6 +121,8 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
         "latent-space.png",
         "metrics.json",
         "model.pt",
+        "motions.gif",
+        "motions.png",
         "reconstruction.png",
         "run.json",
         "training.pt",

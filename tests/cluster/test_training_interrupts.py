@@ -25,7 +25,7 @@ def same(first: dict[str, torch.Tensor], second: dict[str, torch.Tensor]) -> boo
 def command(dataset: Path, model: Path, root: Path) -> list[str]:
     return [
         *(sys.executable, "-m", "cluster", "train", "--dataset", str(dataset), "--model", str(model)),
-        *("--set", "train.updates=500", "--set", "train.threads=1"),
+        *("--set", "train.updates=500", "--set", "train.threads=1", "--set", "train.moments=0"),
         *(
             "--set",
             f"train.cache_folder={root / 'cache'}",

@@ -19,7 +19,7 @@ def test_the_demo_leaves_every_result_and_a_second_one_repeats_nothing(
 ):
     settings = Settings(
         collect=CollectSettings(actors=2, episodes_per_shard=64),
-        train=TrainSettings(threads=2),
+        train=TrainSettings(threads=2, moments=0),
         compare=CompareSettings(slots=2, pool_size=200),
     )
     tracker = open_tracker(tracking_settings)

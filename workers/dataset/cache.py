@@ -15,7 +15,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns
-from workers.rollout import DIVERGED, degrees
+from workers.rollout import DIVERGED, degrees, sampled
 
 _READY = "cache.json"
 _ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
@@ -149,7 +149,7 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
     }
     filled = 0
     for shard, columns in dataset.batches():
-        rows = _sampled(columns, stride, dataset.identity.horizon // stride)
+        rows = _sampled(columns, sampled(dataset.identity.horizon, stride))
         _require_finite(rows, dataset.path(shard))
         size = len(rows["episode"])
         for name, values in rows.items():
@@ -159,14 +159,13 @@ def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None
         array.flush()
 
 
-def _sampled(columns: Columns, stride: int, samples: int) -> dict[str, np.ndarray]:
+def _sampled(columns: Columns, steps: slice) -> dict[str, np.ndarray]:
     sane = np.array([stop != DIVERGED for stop in columns.stop])
-    last = slice(stride - 1, samples * stride, stride)
     return {
         "episode": columns.episode[sane],
         "x": columns.x[sane],
-        "xi": columns.xi[sane][:, :, last],
-        "bad": degrees(columns.bad[sane][:, last]),
+        "xi": columns.xi[sane][:, :, steps],
+        "bad": degrees(columns.bad[sane][:, steps]),
         "y": columns.y[sane],
         "f": columns.f[sane],
     }

@@ -1,0 +1,1 @@
+"""Studies behind the documentation: each takes minutes to hours, goes on where it was, and leaves a table."""
