@@ -129,7 +129,7 @@ def _plan(
     with usage_errors():
         setup.gap(gap)
     grid.require(model)
-    path, trained_on = _checkpoint(model, setup) if grid.with_model() and model else (None, setup.name)
+    path, trained_on = usable(model, setup) if grid.with_model() and model else (None, setup.name)
     level = str(ranges(gap)) if "=" in gap else gap  # so that equal ranges are one comparison
     job = ComparisonJob(
         folder=folder.resolve(),
@@ -158,17 +158,21 @@ def _plan(
     )
 
 
-def _checkpoint(model: Path, setup: Setup) -> tuple[Path, str]:
-    """The checkpoint and the setup it was trained on: this one, or the one that it stands in for."""
+def usable(model: Path, setup: Setup) -> tuple[Path, str]:
+    """The checkpoint and the setup it was trained on: this one, or the one that it stands in for.
+
+    Raises:
+        UserError: it cannot be read, or was trained on another one.
+    """
     path = model / "model.pt" if model.is_dir() else model
     try:
         _, metadata = checkpoint.load(path)
-        if metadata.get("setup") != (found := robots.stands_in_for(setup.name)):
-            found = setup.name
-        checkpoint.require(path, metadata, {"setup": found})
+        twin = robots.stands_in_for(setup.name)
+        trained_on = twin if metadata.get("setup") == twin else setup.name
+        checkpoint.require(path, metadata, {"setup": trained_on})
     except (FileNotFoundError, ValueError) as error:
         raise UserError(f"cannot use the model: {error}") from error
-    return path, found
+    return path, trained_on
 
 
 def _is_finished(plan: _Plan, note: Note) -> bool:

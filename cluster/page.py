@@ -60,9 +60,7 @@ def checkpoints(summary: Summary, initial: int) -> list[int]:
 
 
 def _about(summary: Summary, initial: int) -> str:
-    tuning = (
-        "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
-    )
+    tuning = "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
     notes = [tuning] if summary.purpose != "reporting" else []
     return (
         "".join(f'<p class="note">{note}</p>' for note in (*notes, *_remarks(summary)))
