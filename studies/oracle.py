@@ -196,8 +196,8 @@ def main() -> None:
     against = [f"− {name} after {n}" for name in (RANDOM, "screened-random") for n in AFTER]
     note = (
         f"\n{dataset.identity.setup}, model {what[0][:12]}, {given.candidates} held-out episodes as "
-        f"candidates, each under physics of its own; {given.runs} paired runs, 90 % bootstrap intervals. `error` and `y` "
-        "are those of trajectories decoded from the features, against the per-step median, and of badness.\n"
+        f"candidates, each under physics of its own; {given.runs} paired runs, 90 % bootstrap intervals. "
+        "`error` and `y` are those of trajectories decoded from the features, against the per-step median, and of badness.\n"
     )
     written(
         given.out / "table.md", table(["method", "oracle", "error", "y", *against], rows_of(found)) + note
