@@ -197,7 +197,8 @@ def main() -> None:
     note = (
         f"\n{dataset.identity.setup}, model {what[0][:12]}, {given.candidates} held-out episodes as "
         f"candidates, each under physics of its own; {given.runs} paired runs, 90 % bootstrap intervals. "
-        "`error` and `y` are those of trajectories decoded from the features, against the per-step median, and of badness.\n"
+        "`error` is that of trajectories decoded from the features, against the per-step median; `y` is the "
+        "correlation of predicted and true badness.\n"
     )
     written(
         given.out / "table.md", table(["method", "oracle", "error", "y", *against], rows_of(found)) + note

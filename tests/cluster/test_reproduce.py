@@ -172,7 +172,9 @@ def test_a_figure_is_made_from_data_to_table_and_made_again_by_nothing(
     ray_session, tracking_settings, franka_dataset, tmp_path, capsys
 ):
     settings = Settings(
-        train=TrainSettings(updates=4, epoch_updates=2, cache_folder=tmp_path / "cache", threads=1),
+        train=TrainSettings(
+            updates=4, epoch_updates=2, cache_folder=tmp_path / "cache", threads=1, moments=0
+        ),
         compare=CompareSettings(pool_size=100),
     )
     reproduction = plan_of(TINY, tmp_path, dataset=franka_dataset)
