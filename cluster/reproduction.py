@@ -75,8 +75,8 @@ class Reproduction:
         return settings.updates
 
     def cache_size(self, settings: TrainSettings) -> int:
-        """Bytes of the decoded episodes, nearly all of them trajectories."""
-        sizes = self._sizes(self.training(settings, NINE))
+        """Bytes of the episodes that these settings decode, nearly all of them trajectories."""
+        sizes = self._sizes(settings)
         return 4 * self.episodes * sizes.observation_dim * sizes.time_steps
 
     def _sizes(self, settings: TrainSettings) -> Sizes:
