@@ -1,14 +1,11 @@
 """The command line `svaedc`: the same on a laptop, against a cluster, and under `ray job submit`."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cluster.config import Part, Settings
 from cluster.errors import UserError
 from cluster.options import (
     Address,
@@ -20,17 +17,13 @@ from cluster.options import (
     SetupName,
     TrainedModel,
     durable,
-    interruptible,
     settings_of,
     setup_of,
     usage_errors,
     working,
 )
 from cluster.progress import say
-
-if TYPE_CHECKING:
-    from cluster.session import Session
-    from cluster.tracking import Tracker
+from cluster.services import services
 
 app = typer.Typer(
     name="svaedc",
@@ -41,25 +34,9 @@ app = typer.Typer(
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
     "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
-    "`render` shows an episode. "
+    "`render` shows an episode, `reproduce` makes a figure of the paper. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
-
-
-@contextmanager
-def _services(
-    settings: Settings, address: str | None, parts: tuple[Part, ...] = ("dashboard",)
-) -> Iterator[tuple["Session", "Tracker"]]:
-    """The tracker, whose store must exist before anything else starts, and the Ray session."""
-    from cluster.session import connect
-    from cluster.tracking import open_tracker
-
-    store = settings.tracking.uri.removeprefix("sqlite:///")
-    if store != settings.tracking.uri:
-        durable(Path(store))
-    tracker = open_tracker(settings.tracking)
-    with interruptible(), connect(settings.ray, address, parts) as session:
-        yield session, tracker
 
 
 @app.command()
@@ -77,7 +54,7 @@ def demo(
     folder.mkdir(parents=True, exist_ok=True)
     store = f"tracking.uri=sqlite:///{folder / 'mlflow.db'}"
     settings = settings_of(config, [store, *(overrides or [])])
-    with _services(settings, address) as (session, tracker):
+    with services(settings, address) as (session, tracker):
         run_demo(folder, settings, session, tracker)
 
 
@@ -112,7 +89,7 @@ def collect(
     from cluster.collect import foretell
 
     settings, chosen = settings_of(config, overrides), working(setup_of(setup, bad), seed)
-    with _services(settings, address, parts=()) as (session, tracker):
+    with services(settings, address, parts=()) as (session, tracker):
         (foretell if plan else run_collect)(
             setup=chosen,
             episodes=episodes,
@@ -149,7 +126,7 @@ def train(
     from cluster.train import train as run_train
 
     settings = settings_of(config, overrides)
-    with _services(settings, address) as (session, tracker):
+    with services(settings, address) as (session, tracker):
         (run_sweep if sweep else run_train)(
             folder=dataset,
             model=model,
@@ -195,7 +172,7 @@ def compare(
     grid.require(model)
     with usage_errors():
         chosen.gap(gap)
-    with _services(settings, address) as (session, tracker):
+    with services(settings, address) as (session, tracker):
         run_compare(
             setup=chosen,
             grid=grid,
@@ -225,8 +202,10 @@ def _add_groups() -> None:
     from cluster.dataset_commands import app as dataset_app
     from cluster.hardware.commands import app as hardware_app
     from cluster.render_command import render
+    from cluster.reproduce_command import reproduce
 
     app.command()(render)
+    app.command()(reproduce)
     app.add_typer(dataset_app, name="dataset")
     app.add_typer(hardware_app, name="hardware")
 

@@ -22,6 +22,7 @@ from svaedc import checkpoint
 from svaedc.comparison import Trial
 from svaedc.summaries import Summary
 from workers.dataset.shards import sha256
+from workers.hardware import robots
 from workers.physics import ranges
 from workers.rollout import VERSION
 from workers.setups import Setup
@@ -47,6 +48,8 @@ class _Plan:
     model: str  # its hash; "" when no method asked for needs one
     identity: Mapping[str, Any]
     slots: int
+    caption: str
+    trained_on: str  # the setup of the model's data where it is another one; "" elsewhere
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -57,6 +60,7 @@ class _Plan:
             "trials": self.job.trials,
             "seed": self.grid.seed,
             "slots": self.slots,
+            **({"model_trained_on": self.trained_on} if self.trained_on else {}),
         }
 
     def missing(self, runs: Mapping[RunKey, Sequence[Trial]]) -> list[RunKey]:
@@ -75,8 +79,21 @@ def compare(
     settings: CompareSettings,
     session: Session,
     tracker: Tracker,
+    caption: str = "",
 ) -> Comparison:
     """Run what is missing of a comparison, then summarise all of it.
+
+    Args:
+        setup: whose controllers are tried.
+        grid: methods and seeds.
+        trials: suggested in each run.
+        gap: level of the hidden physics.
+        model: folder of one trained on the setup, or on the one it stands in for.
+        folder: of the results.
+        settings: of the runs.
+        session: where they run.
+        tracker: that records them.
+        caption: of figure and page, before what they say themselves.
 
     Raises:
         UsageError: a method or gap level does not exist, a gap's range is impossible, or a method lacks its
@@ -84,7 +101,7 @@ def compare(
         UserError: the folder holds another comparison or cannot be written, the model is of another setup,
             runs kept failing, or MLflow lacks some of the results.
     """
-    plan = _plan(setup, grid, trials, gap, model, folder, settings)
+    plan = _plan(setup, grid, trials, gap, model, folder, settings, caption)
     session.preflight(settings.slots)
     with alone_in(folder):
         grid.require_purpose(folder, seeds_in(folder))
@@ -107,11 +124,12 @@ def _plan(
     model: Path | None,
     folder: Path,
     settings: CompareSettings,
+    caption: str,
 ) -> _Plan:
     with usage_errors():
         setup.gap(gap)
     grid.require(model)
-    path = _checkpoint(model, setup) if grid.with_model() and model else None
+    path, trained_on = usable(model, setup) if grid.with_model() and model else (None, setup.name)
     level = str(ranges(gap)) if "=" in gap else gap  # so that equal ranges are one comparison
     job = ComparisonJob(
         folder=folder.resolve(),
@@ -129,17 +147,32 @@ def _plan(
         "initial_trials": settings.initial_trials,
         "rollout_version": VERSION,
     }
-    return _Plan(job, grid, sha256(path) if path else "", identity, settings.slots)
+    return _Plan(
+        job=job,
+        grid=grid,
+        model=sha256(path) if path else "",
+        identity=identity,
+        slots=settings.slots,
+        caption=caption,
+        trained_on=trained_on if trained_on != setup.name else "",
+    )
 
 
-def _checkpoint(model: Path, setup: Setup) -> Path:
+def usable(model: Path, setup: Setup) -> tuple[Path, str]:
+    """The checkpoint and the setup it was trained on: this one, or the one that it stands in for.
+
+    Raises:
+        UserError: it cannot be read, or was trained on another one.
+    """
     path = model / "model.pt" if model.is_dir() else model
     try:
         _, metadata = checkpoint.load(path)
-        checkpoint.require(path, metadata, {"setup": setup.name})
+        twin = robots.stands_in_for(setup.name)
+        trained_on = twin if metadata.get("setup") == twin else setup.name
+        checkpoint.require(path, metadata, {"setup": trained_on})
     except (FileNotFoundError, ValueError) as error:
         raise UserError(f"cannot use the model: {error}") from error
-    return path
+    return path, trained_on
 
 
 def _is_finished(plan: _Plan, note: Note) -> bool:
@@ -170,7 +203,8 @@ def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
 def _record(plan: _Plan, setup: Setup, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
     runs = list(all_runs(plan.job.folder))
     summary = summary_of(plan.job, runs)
-    report = publish(plan.job, setup, runs, summary, {**parameters, "MLflow run": tracked.run.url})
+    settings = {**parameters, "MLflow run": tracked.run.url}
+    report = publish(plan.job, setup, runs, summary, settings, plan.caption)
     for line in lines(summary):
         say(line)
     say(f"{plan.job.folder / PAGE}; {tracked.run.url}")

@@ -15,6 +15,7 @@ from cluster.page import page
 from cluster.results import Runs, rows, write_table
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Summary
+from workers.hardware import robots
 from workers.randomness import generator
 from workers.setups import Setup
 
@@ -38,7 +39,12 @@ def summary_of(job: ComparisonJob, runs: Runs) -> Summary:
 
 
 def publish(
-    job: ComparisonJob, setup: Setup, runs: Runs, summary: Summary, settings: Mapping[str, Any]
+    job: ComparisonJob,
+    setup: Setup,
+    runs: Runs,
+    summary: Summary,
+    settings: Mapping[str, Any],
+    caption: str = "",
 ) -> Report:
     """Write what people read; each file is whole, or as it was before.
 
@@ -48,16 +54,17 @@ def publish(
         runs: all trials.
         summary: of them.
         settings: that the comparison was made with, for the page.
+        caption: before the title of figure and page; "" for none.
 
     Raises:
         UserError: the disk is full.
     """
     path = job.folder / SUMMARY
-    title = f"{job.setup}: Bayesian optimisation under hidden physics ({job.gap} gap)"
+    title = _title(job, caption)
     with writing(job.folder):
         table = write_table(job.folder, runs, setup=job.setup, gap=job.gap)
         with replacing(path) as unfinished:
-            unfinished.write_text(json.dumps(summary.as_json(), indent=2) + "\n")
+            unfinished.write_text(json.dumps({"title": title, **summary.as_json()}, indent=2) + "\n")
         drawn = figures.best_so_far(
             job.folder / FIGURE,
             summary,
@@ -70,6 +77,13 @@ def publish(
         with replacing(job.folder / PAGE) as unfinished:
             unfinished.write_text(written, encoding="utf-8")
     return Report((table, path, job.folder / PAGE), drawn)
+
+
+def _title(job: ComparisonJob, caption: str) -> str:
+    """What was compared; a stand-in for hardware is called one."""
+    name = f"{job.setup}, a {robots.STAND_IN}" if robots.stands_in_for(job.setup) else job.setup
+    before = f"{caption}\n" if caption else ""
+    return f"{before}{name}: Bayesian optimisation under hidden physics ({job.gap} gap)"
 
 
 def lines(summary: Summary) -> Iterator[str]:

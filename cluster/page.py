@@ -60,15 +60,26 @@ def checkpoints(summary: Summary, initial: int) -> list[int]:
 
 
 def _about(summary: Summary, initial: int) -> str:
-    note = "" if summary.purpose == "reporting" else (
-        '<p class="note">These runs have tuning seeds: they are for choosing settings, '
-        "and their numbers are no results.</p>"
-    )  # fmt: skip
+    tuning = "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
+    notes = [tuning] if summary.purpose != "reporting" else []
     return (
-        f"{note}<p>Every run has {summary.trials} trials: {initial} random ones, shared by all methods of a "
+        "".join(f'<p class="note">{note}</p>' for note in (*notes, *_remarks(summary)))
+        + f"<p>Every run has {summary.trials} trials: {initial} random ones, shared by all methods of a "
         "seed together with the hidden physics, then those the method suggested. Intervals are 90 %, "
         "over complete runs.</p>"
     )
+
+
+def _remarks(summary: Summary) -> Iterable[str]:
+    """What a reader would otherwise wonder about."""
+    ran = [method for method in summary.methods.values() if method.runs]
+    if ran and not any(method.first_success.reached for method in ran):
+        yield "Nobody reached the threshold of success: no run of any method succeeded in any trial."
+    if any(method.failed_trials.mean > 0 for method in ran):
+        yield (
+            "Some trials gave no objective. They teach no method anything, are not tried again by those that "
+            "search a pool, and enter no mean; the last column has their share."
+        )
 
 
 def _image(path: Path) -> str:

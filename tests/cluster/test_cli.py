@@ -29,7 +29,17 @@ COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
 def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
     result = svaedc("--help", folder=tmp_path)
     assert result.returncode == 0
-    for command in ("demo", "collect", "train", "compare", "render", "ui", "dataset", "hardware"):
+    for command in (
+        "demo",
+        "collect",
+        "train",
+        "compare",
+        "reproduce",
+        "render",
+        "ui",
+        "dataset",
+        "hardware",
+    ):
         assert command in result.stdout
     loaded = (
         "import cluster.cli, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"

@@ -18,7 +18,7 @@ import pytest
 import torch
 
 from cluster import figures
-from cluster.compare import compare
+from cluster.compare import compare, usable
 from cluster.comparison_folder import alone_in
 from cluster.comparison_job import evaluation
 from cluster.comparison_runs import Standing
@@ -337,6 +337,18 @@ def test_a_model_of_another_setup_or_a_damaged_one_is_refused(compared, tmp_path
         compared("svae", model=tmp_path / "other")
     with pytest.raises(UserError, match="cannot use the model"):
         compared("svae", model=tmp_path / "nowhere")
+
+
+def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):
+    on_franka, on_yumi = (untrained(tmp_path / name, setup=name) for name in ("franka", "yumi"))
+    assert usable(on_franka, setups.load("franka-rehearsal"))[1] == "franka"
+    assert usable(on_franka, setups.load("franka"))[1] == "franka"
+    own = untrained(tmp_path / "own", setup="franka-rehearsal")
+    assert usable(own, setups.load("franka-rehearsal"))[1] == "franka-rehearsal"
+    with pytest.raises(UserError, match="made for setup 'yumi', not 'franka-rehearsal'"):
+        usable(on_yumi, setups.load("franka-rehearsal"))
+    with pytest.raises(UserError, match="made for setup 'franka-rehearsal', not 'franka'"):
+        usable(own, setups.load("franka"))
 
 
 def test_another_comparison_in_the_folder_is_refused_naming_the_difference(compared):

@@ -1,6 +1,7 @@
 """The report page: whole, offline, and honest about what was not reached."""
 
 from base64 import b64encode
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -18,6 +19,11 @@ def rows(methods: dict[str, float], first_seed: int) -> list[Row]:
         for run in range(2)
         for index in range(5)
     ]
+
+
+def reaching(rows: list[Row]) -> list[Row]:
+    """The same trials of another method, which all succeed."""
+    return [replace(row, method="lucky", success=True) for row in rows if row.method == "se"]
 
 
 def summary(rows: list[Row]):
@@ -67,7 +73,23 @@ def test_the_page_is_whole_and_loads_nothing_from_elsewhere(tmp_path):
 def test_the_page_says_so_when_nobody_reaches_the_threshold_or_seeds_are_for_tuning():
     text = page("title", summary(rows({"se": 0.5}, 1000)), [], 2, {})
     assert "not reached (0 of 2 runs)" in Elements(text).cells
+    assert "Nobody reached the threshold of success" in text
     assert "tuning seeds" in text
+
+
+def test_the_page_is_silent_about_the_threshold_when_one_run_reaches_it():
+    given = [*rows({"se": 0.5, "random": 0.1}, 0)]
+    reached = page("title", summary([*given, *reaching(given)]), [], 2, {})
+    assert "Nobody" not in reached
+    assert "gave no objective" not in reached
+
+
+def test_the_page_explains_trials_without_an_objective():
+    given = [replace(row, f=float("nan")) if row.trial == 3 else row for row in rows({"se": 0.5}, 0)]
+    text = page("title", summary(given), [], 2, {})
+    assert "Some trials gave no objective. They teach no method anything" in text
+    # One of three suggested trials.
+    assert Elements(text).cells[8] == "33%"
 
 
 def test_the_page_shows_a_method_without_a_whole_run_last():

@@ -9,6 +9,9 @@ from workers import setups
 from workers.hardware.driver import RobotDriver
 from workers.hardware.rehearsal import RehearsalRobot
 
+STAND_IN = "simulated stand-in"
+"""Stands wherever the result of one does, so that nobody takes it for a robot's."""
+
 
 @dataclass(frozen=True)
 class Robot:
@@ -53,3 +56,8 @@ def find(name: str) -> Robot:
         LookupError: when there is none; the message names the nearest.
     """
     return ROBOTS[setups.known(name, "robot", ROBOTS)]
+
+
+def stands_in_for(setup: str) -> str:
+    """The setup whose data and models a stand-in of that name works with; "" for every other setup."""
+    return ROBOTS[setup].setup if setup in ROBOTS else ""

@@ -1,0 +1,110 @@
+"""`svaedc reproduce`: collect, train and compare as a recipe says, then hold results against the paper."""
+
+from cluster.bill import bill, lines
+from cluster.collect import collect
+from cluster.compare import compare
+from cluster.config import Settings
+from cluster.grid import Grid
+from cluster.placement import free_machines, place
+from cluster.progress import say, timed
+from cluster.recipe import Panel
+from cluster.reproduction import Reproduction, cores
+from cluster.reproduction_report import Table, publish, table
+from cluster.session import Session
+from cluster.tracking import Tracker
+from cluster.train import train
+from svaedc.summaries import Summary
+from workers import setups
+
+
+def foretell(reproduction: Reproduction, settings: Settings) -> None:
+    """Say what a reproduction will cost, and start nothing."""
+    _say_bill(reproduction, settings, cores(settings))
+
+
+def reproduce(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> Table:
+    """Do what is missing of a reproduction; the same call goes on after an interruption.
+
+    Raises:
+        UserError: as `collect`, `train` and `compare` do; the cluster is checked for all of them first.
+    """
+    _preflight(reproduction, settings, session)
+    _say_bill(reproduction, settings, session.cpus)
+    _collect(reproduction, settings, session, tracker)
+    for latent in reproduction.trains:
+        _train(reproduction, latent, settings, session, tracker)
+    summaries = {
+        panel.name: _compare(reproduction, panel, settings, session, tracker)
+        for panel in reproduction.recipe.panels
+    }
+    found = table(reproduction.recipe, summaries, settings.compare.initial_trials)
+    for path in publish(reproduction, found):
+        say(f"wrote {path}")
+    for line in found.lines():
+        say(line)
+    return found
+
+
+def _say_bill(reproduction: Reproduction, settings: Settings, count: int) -> None:
+    recipe = reproduction.recipe
+    say(f"{recipe.figure}: {recipe.label}, {reproduction.runs} runs of each method, in {reproduction.folder}")
+    for line in lines(reproduction, bill(reproduction, settings, count), count):
+        say(line)
+
+
+def _preflight(reproduction: Reproduction, settings: Settings, session: Session) -> None:
+    """Refuse now what a later step would refuse after hours of work."""
+    session.preflight(settings.compare.slots)
+    if reproduction.collects:
+        session.preflight(settings.collect.actor_count(session.cpus))
+    if not all(map(reproduction.is_trained, reproduction.trains)):
+        train = settings.train
+        place(train.workers, train.threads, free_machines(session), train.device)
+
+
+def _collect(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> None:
+    if not reproduction.missing_episodes():
+        return
+    with timed(f"collect {reproduction.recipe.data}"):
+        collect(
+            setup=setups.load(reproduction.recipe.data),
+            episodes=reproduction.episodes,
+            folder=reproduction.dataset,
+            seed=0,
+            settings=settings.collect,
+            session=session,
+            tracker=tracker,
+        )
+
+
+def _train(
+    reproduction: Reproduction, latent: str, settings: Settings, session: Session, tracker: Tracker
+) -> None:
+    with timed(f"train {latent}"):
+        train(
+            folder=reproduction.dataset,
+            model=reproduction.models[latent],
+            preset=reproduction.scale.preset,
+            seed=0,
+            settings=reproduction.training(settings.train, latent),
+            session=session,
+            tracker=tracker,
+        )
+
+
+def _compare(
+    reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
+) -> Summary:
+    with timed(f"compare {panel.name}"):
+        return compare(
+            setup=setups.load(panel.setup),
+            grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
+            trials=panel.trials,
+            gap=panel.gap,
+            model=reproduction.models[panel.latent] if panel.latent else None,
+            folder=reproduction.comparison(panel),
+            settings=settings.compare,
+            session=session,
+            tracker=tracker,
+            caption=f"{reproduction.recipe.figure}, {panel.name}: {panel.title}",
+        ).summary

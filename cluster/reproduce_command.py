@@ -1,0 +1,71 @@
+"""`svaedc reproduce`: a figure of the paper, from data to picture."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cluster.options import Address, Config, Overrides, durable, settings_of, usage_errors
+from cluster.services import services
+
+_SCALE_HELP = (
+    "machine: the data that two cores collect in hours; paper: 500,000 episodes and its own training."
+)
+
+
+def reproduce(
+    figure: Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13.")],
+    folder: Annotated[
+        Path,
+        typer.Option("--folder", help="Of data, models and results; shared by figures.", callback=durable),
+    ] = Path("reproduction"),
+    scale: Annotated[str, typer.Option("--scale", help=_SCALE_HELP)] = "machine",
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=200, help="To collect, instead of the scale's.")
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, max=1000, help="Of each method, instead of the paper's.")
+    ] = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", help="Collected already; used as it is.", callback=durable)
+    ] = None,
+    model: Annotated[
+        list[Path] | None,
+        typer.Option("--model", help="Trained already; may be repeated, one of each latent size."),
+    ] = None,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+    *,
+    plan: Annotated[bool, typer.Option("--plan", help="Only say what it will cost.")] = False,
+) -> None:
+    """Make a figure of the paper: collect, train, compare, and hold the numbers against what it claims.
+
+    It says first what that costs. It may be interrupted: the same command goes on, and keeps what is done.
+    Figures 4 and 7 need robots: here simulated stand-ins take their place, and are called so everywhere.
+
+    Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
+    `svaedc reproduce figure-7 --runs 50`
+    """
+    from cluster import recipes
+    from cluster.reproduce import foretell
+    from cluster.reproduce import reproduce as run_reproduction
+    from cluster.reproduction import resolved
+
+    settings = settings_of(config, overrides)
+    with usage_errors():
+        recipe, size = recipes.recipe(figure), recipes.scale(scale)
+    reproduction = resolved(
+        recipe,
+        size,
+        folder,
+        episodes=episodes or size.episodes.get(recipe.data, 0),
+        runs=runs or recipe.runs,
+        dataset=dataset,
+        models=tuple(path.expanduser().absolute() for path in model or ()),
+    )
+    if plan:
+        foretell(reproduction, settings)
+        return
+    with services(settings, address) as (session, tracker):
+        run_reproduction(reproduction, settings, session, tracker)

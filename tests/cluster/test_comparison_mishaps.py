@@ -1,0 +1,92 @@
+"""A comparison in which things go wrong: trials without an objective, and a threshold nobody reaches."""
+
+import json
+import math
+from dataclasses import dataclass, replace
+
+import pyarrow.parquet as pq
+import pytest
+
+from cluster.comparison_job import ComparisonJob
+from cluster.comparison_report import lines, publish, summary_of
+from cluster.results import RunKey, all_runs
+from workers import setups
+from workers.tasks.quadratic import Quadratic
+
+
+@dataclass(frozen=True)
+class Moody(Quadratic):
+    """A quadratic that cannot be measured for a third of all controllers."""
+
+    def objective(self, observed, bad):
+        f = super().objective(observed, bad)
+        return math.nan if observed.xi[5, -1] > 2 / 3 else f
+
+
+SETUP = replace(setups.load("quadratic-30d-intrinsic-3"), task=Moody(30, 3), success=100.0)
+KEYS = [RunKey(method, run) for run in (1000, 1001) for method in ("random", "se")]
+
+
+def job_in(folder) -> ComparisonJob:
+    (folder / "runs").mkdir(parents=True)
+    return ComparisonJob(folder, SETUP.name, "paper", "", pool_size=60, initial=2, trials=6)
+
+
+def run(job: ComparisonJob, key: RunKey) -> None:
+    with SETUP.open() as environment:
+        for _ in job.run(key, SETUP, environment):
+            pass
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory) -> ComparisonJob:
+    """Four runs, each at its end."""
+    made = job_in(tmp_path_factory.mktemp("mishaps") / "whole")
+    for key in KEYS:
+        run(made, key)
+    return made
+
+
+def test_a_trial_without_an_objective_is_marked_counts_for_nothing_and_is_not_tried_again(job):
+    for _, trials in all_runs(job.folder):
+        assert len(trials) == 8
+        for trial in trials:
+            is_failed = bool(trial.x[5] > 2 / 3)
+            assert (trial.status == "failed", math.isnan(trial.f)) == (is_failed, is_failed)
+        measured = [trial.f for trial in trials if trial.status == "ok"]
+        assert trials[-1].best == max(measured)
+        assert len({trial.x.tobytes() for trial in trials}) == 8
+    assert any(trial.status == "failed" for key, trials in all_runs(job.folder) for trial in trials)
+
+
+def test_a_run_goes_on_after_a_trial_without_an_objective_as_if_it_had_not_stopped(job, tmp_path):
+    key = next(
+        key for key, trials in all_runs(job.folder) if "failed" in [trial.status for trial in trials[:7]]
+    )
+    again = job_in(tmp_path / "again")
+    whole = key.path(job.folder).read_bytes().splitlines(keepends=True)
+    key.path(again.folder).write_bytes(b"".join(whole[:7]))
+    run(again, key)
+    [(_, trials)] = all_runs(again.folder)
+    assert [trial.x.tobytes() for trial in trials] == [
+        trial.x.tobytes() for other, found in all_runs(job.folder) if other == key for trial in found
+    ]
+
+
+def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(job):
+    runs = list(all_runs(job.folder))
+    summary = summary_of(job, runs)
+    publish(job, SETUP, runs, summary, {})
+    page = (job.folder / "report.html").read_text()
+    assert "Some trials gave no objective. They teach no method anything" in page
+    assert "Nobody reached the threshold of success" in page
+    assert "not reached (0 of 2 runs)" in page
+    written = (job.folder / "summary.json").read_text()
+    found = json.loads(written, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert all(method["successful_runs"]["mean"] == 0 for method in found["methods"].values())
+    failed = [trial.status for _, trials in runs for trial in trials if trial.index >= 2].count("failed")
+    shares = [method["failed_trials"]["mean"] for method in found["methods"].values()]
+    assert sum(shares) * 12 == pytest.approx(failed)
+    table = pq.read_table(job.folder / "trials.parquet").to_pylist()
+    assert {row["status"] for row in table if math.isnan(row["f"])} == {"failed"}
+    assert all("best after 8 trials" in line for line in lines(summary))

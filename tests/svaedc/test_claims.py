@@ -1,0 +1,104 @@
+"""Verdicts on claims, against comparisons whose answer is known because it was made."""
+
+import math
+
+import numpy as np
+import pytest
+
+from svaedc.claims import Claim, Evidence, Gain, Like, Steadier, Successes
+from svaedc.statistics import summarise
+from svaedc.summaries import Reporting, Row
+
+INITIAL = 2
+
+
+def panel(ends: dict[str, list[float]], success_above: float = 0.5):
+    """A comparison in which each run has two bad random trials and three equal ones of this objective."""
+    rows = [
+        Row(method, run, trial, f, f > success_above)
+        for method, all_f in ends.items()
+        for run, end in enumerate(all_f)
+        for trial, f in enumerate([-1.0, -1.0, end, end, end])
+    ]
+    return summarise(rows, Reporting(initial=INITIAL), np.random.default_rng(0))
+
+
+NOISE = np.linspace(-0.1, 0.1, 8)
+
+
+def around(middle: float, spread: float) -> list[float]:
+    return (middle + spread * NOISE).tolist()
+
+
+PANELS = {
+    "left": panel({"good": around(0.6, 1), "bad": around(0.2, -1), "twin": around(0.6, -1)}),
+    "tight": panel({"good": around(0.6, 0.25)}),
+}
+
+
+@pytest.mark.parametrize(
+    ("evidence", "verdict"),
+    [
+        (Gain("left", "good", "bad", 3), "holds"),
+        (Gain("left", "bad", "good", 3), "does not hold"),
+        (Gain("left", "good", "twin", 3), "open"),
+        (Gain("left", "good", "bad", 3, high=1.0), "holds"),
+        (Gain("left", "good", "bad", 3, high=0.4), "open"),
+        (Gain("left", "good", "bad", 3, high=0.1), "does not hold"),
+        (Gain("left", "good", "bad", 4), "not measured"),
+        (Gain("left", "good", "absent", 3), "not measured"),
+        (Gain("absent", "good", "bad", 3), "not measured"),
+        (Like("left", "good", "twin", 3), "holds"),
+        (Like("left", "good", "bad", 3), "does not hold"),
+        (Successes("left", "good", "runs", 0.5, 1.0), "holds"),
+        (Successes("left", "good", "runs", 0.0, 0.4), "does not hold"),
+        (Successes("left", "bad", "trials", 0.0, 0.04), "holds"),
+        (Successes("left", "absent", "runs", 0.0, 1.0), "not measured"),
+        (Steadier("tight", "left", "good"), "holds"),
+        (Steadier("left", "tight", "good"), "does not hold"),
+        (Steadier("tight", "left", "bad"), "not measured"),
+        (Steadier("tight", "absent", "good"), "not measured"),
+    ],
+)
+def test_a_verdict_is_what_the_comparison_was_made_to_say(evidence, verdict):
+    assert isinstance(evidence, Evidence)
+    assert evidence.found(PANELS, INITIAL).verdict == verdict
+
+
+def test_a_gain_is_the_mean_of_the_paired_differences_with_its_interval():
+    found = Gain("left", "good", "bad", 1).found(PANELS, INITIAL)
+    assert found.runs == 8
+    assert found.value.mean == pytest.approx(np.mean(0.4 + 2 * NOISE))
+    assert found.value.low < 0.4 < found.value.high
+
+
+def test_the_shares_are_those_of_runs_and_of_suggested_trials():
+    runs = panel({"half": [1.0, 1.0, 0.0, 0.0]})
+    among_runs = Successes("it", "half", "runs", 0.5, 0.5).found({"it": runs}, INITIAL)
+    among_trials = Successes("it", "half", "trials", 0.5, 0.5).found({"it": runs}, INITIAL)
+    assert (among_runs.value.mean, among_trials.value.mean) == (0.5, 0.5)
+    assert among_runs.runs == 4
+
+
+def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_without_an_interval():
+    found = Steadier("tight", "left", "good").found(PANELS, INITIAL)
+    assert found.value.mean == pytest.approx(0.25)
+    assert math.isnan(found.value.low)
+
+
+def test_one_run_leaves_a_gain_open():
+    alone = {"it": panel({"good": [0.9], "bad": [0.1]})}
+    assert Gain("it", "good", "bad", 3).found(alone, INITIAL).verdict == "open"
+    assert Like("it", "good", "bad", 3).found(alone, INITIAL).verdict == "open"
+
+
+def test_every_measure_says_what_it_is_about():
+    assert Gain("left", "good", "bad", 3, high=2.5).measure == "good − bad ≤ 2.5, best after 3"
+    assert Like("left", "good", "bad", 3).measure == "good − bad ≈ 0, best after 3"
+    assert Successes("left", "good", "runs", 0.0, 1.0).measure == "good, share of runs with a success"
+    assert Steadier("tight", "left", "good").measure == "good, width of the last interval, tight / left"
+
+
+def test_a_claim_without_evidence_is_refused():
+    with pytest.raises(ValueError, match="at least one piece of evidence, got none for 'it is so'"):
+        Claim("it is so", "section 1", ())
