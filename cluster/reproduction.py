@@ -12,7 +12,8 @@ from cluster.training_record import MEASURES
 from svaedc import checkpoint
 from svaedc.presets import Sizes, preset
 from workers import setups
-from workers.dataset.folder import MANIFEST, Dataset, open_dataset
+from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.manifest import MANIFEST
 
 
 @dataclass(frozen=True)

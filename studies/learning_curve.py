@@ -99,7 +99,9 @@ def main() -> None:
     dataset, cache = source.opened()
     sizes = counts(len(cache.training()))
     if len(sizes) < 2:
-        parser.error(f"a curve needs more than {SMALLEST:,} training episodes, {source.dataset} has {sizes[0]:,}")
+        parser.error(
+            f"a curve needs more than {SMALLEST:,} training episodes, {source.dataset} has {sizes[0]:,}"
+        )
     cells = [Cell(dataset.fingerprint(), count, given.updates, given.seed) for count in sizes]
     cost = SECONDS_PER_UPDATE * given.updates + 20
     found = results(Study(given.out), cells, partial(compute, source), cost, given.processes)
