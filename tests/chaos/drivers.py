@@ -1,11 +1,13 @@
 """`svaedc collect` as a process of its own that may be killed, and what its dataset must be in the end."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections import Counter
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,10 @@ import numpy as np
 from tests.chaos import victims
 from workers import setups
 from workers.collection import collect_shard
+from workers.dataset import shards
 from workers.dataset.folder import MANIFEST, Dataset, create
 from workers.dataset.identity import identity_of
+from workers.dataset.inventory import sweep_digests
 from workers.dataset.publication import WRITING, writer
 from workers.dataset.shards import Shard
 
@@ -25,13 +29,21 @@ PATIENCE = 600.0
 """Seconds after which something that must end is taken to hang."""
 
 
-def collected_here(folder: Path) -> Dataset:
-    """The dataset as one process makes it that nobody disturbs."""
+def collected_here(folder: Path, episodes: int = EPISODES) -> Dataset:
+    """The dataset as one process makes it, if nobody disturbs it; the shards that are there are kept."""
     setup = setups.load(SETUP)
     dataset = create(folder, identity_of(setup, seed=SEED, episodes_per_shard=PER_SHARD))
-    for shard in dataset.missing(EPISODES):
+    for shard in dataset.missing(episodes):
         collect_shard(setup, dataset, shard)
     return dataset
+
+
+def collect_and_clean(folder: Path, episodes: int) -> None:
+    """What a driver and its rollout processes do to a dataset: sweep, collect what is missing, sweep."""
+    shards.sweep(folder)
+    dataset = collected_here(folder, episodes)
+    shards.sweep(folder)
+    sweep_digests(dataset)
 
 
 def command(folder: Path, store: Path, *options: str) -> list[str]:
@@ -87,6 +99,14 @@ class Blows:
         self.dealt["actor"] += 1
         self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{pid}")))
         return True
+
+    def writer(self, process: BaseProcess) -> None:
+        """Kill a process that writes shards itself, unless it has ended."""
+        process.kill()
+        process.join()
+        if process.exitcode == -signal.SIGKILL:
+            self.dealt["writer"] += 1
+            self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{process.pid}")))
 
     def driver(self, process: subprocess.Popen[bytes]) -> None:
         """Kill a driver, unless it has ended."""
