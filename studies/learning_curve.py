@@ -77,7 +77,8 @@ def draw(path: Path, cells: Sequence[Cell], found: Sequence[Result]) -> None:
             values = [result[name] for result in found]
             axes.plot([cell.count for cell in cells], values, "o-", color=colour, label=COLUMNS[name])
         axes.set_xscale("log", base=2)
-        axes.set_xticks([cell.count for cell in cells], [f"{cell.count / 1e3:.3g}k" for cell in cells])
+        labels = [f"{cell.count / 1e3:.3g}k" for cell in cells]
+        axes.set_xticks([cell.count for cell in cells], labels, rotation=45)
         axes.minorticks_off()
         axes.set_xlabel("training episodes")
         axes.set_title(title, fontsize=10)
@@ -99,9 +100,7 @@ def main() -> None:
     dataset, cache = source.opened()
     sizes = counts(len(cache.training()))
     if len(sizes) < 2:
-        parser.error(
-            f"a curve needs more than {SMALLEST:,} training episodes, {source.dataset} has {sizes[0]:,}"
-        )
+        parser.error(f"a curve needs over {SMALLEST:,} training episodes, {source.dataset} has {sizes[0]:,}")
     cells = [Cell(dataset.fingerprint(), count, given.updates, given.seed) for count in sizes]
     cost = SECONDS_PER_UPDATE * given.updates + 20
     found = results(Study(given.out), cells, partial(compute, source), cost, given.processes)
