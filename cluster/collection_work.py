@@ -149,6 +149,6 @@ def note_failure(failure: Failed[Shard], dataset: Dataset, tally: Tally) -> None
 
 def _unwritable(dataset: Dataset, error: OSError) -> UserError:
     return UserError(
-        f"cannot write to {dataset.folder}: {error.strerror}. The shards in it are safe; make room or "
-        "repair the disk, and run the same command again"
+        f"cannot write to {dataset.folder}: {error.strerror}. The shards in it are safe; make room, "
+        "or let it be written to, and run the same command again"
     )

@@ -113,7 +113,7 @@ def test_errors_of_shards_and_the_account_of_a_plan_are_kept_in_it(remote):
     RolloutActor(SETUP, str(remote.folder)).collect(missing)
     release(remote)
     assert quarantined(remote) == []
-    spent(remote, Tally(episodes=4), 1)
+    spent(remote, Tally(episodes=4), 1.0)
     assert open_dataset(remote.folder).episodes() == 12
 
 
