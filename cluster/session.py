@@ -122,9 +122,8 @@ def _join(settings: RaySettings, wanted: str) -> None:
     """Joins a running cluster after quick tries of its port and of its token."""
     address = _on_this_machine(settings) if wanted == "auto" else wanted
     _knock(address, settings.connect_timeout_seconds)
-    _use_token()
     try:
-        if LOOPBACK in _machines(address, settings.connect_timeout_seconds):
+        if LOOPBACK in _admitted(address, settings.connect_timeout_seconds):
             _stay_on_loopback()
         ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
     except AuthenticationError as error:
@@ -165,6 +164,19 @@ def _parts(address: str) -> tuple[str, int]:
     if not (colon and host and port.isdigit()) or "/" in address:
         raise UsageError(f"a Ray address is host:port or auto, such as 192.168.1.10:6379, got {address!r}")
     return host.strip("[]"), int(port)
+
+
+def _admitted(address: str, patience: float) -> set[str]:
+    """Network addresses of the cluster's machines, from which on a token is used if the cluster wants one.
+
+    One that wants none must not be shown any: this process would then demand it of the cluster, which takes
+    its silence for death, and ends all that it starts.
+    """
+    try:
+        return _machines(address, patience)
+    except AuthenticationError:
+        _use_token()
+        return _machines(address, patience)
 
 
 def _machines(address: str, patience: float) -> set[str]:
