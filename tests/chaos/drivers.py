@@ -73,14 +73,14 @@ class Blows:
         seed: of all draws.
         dealt: kills by the kind of victim.
         unfinished: kills of an actor that left a file unfinished.
-        seen: every process that was below a driver when something was killed.
+        seen: every process that was below a driver when something was killed, by id and start time.
     """
 
     folder: Path
     seed: int
     dealt: Counter[str] = field(default_factory=Counter)
     unfinished: int = 0
-    seen: set[int] = field(default_factory=set)
+    seen: set[tuple[int, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         """Begin the sequence of draws."""
@@ -110,7 +110,7 @@ class Blows:
 
     def driver(self, process: subprocess.Popen[bytes]) -> None:
         """Kill a driver, unless it has ended."""
-        self.seen.update(victims.below(process.pid))
+        self.seen.update(victims.births(victims.below(process.pid)))
         if process.poll() is None:
             process.kill()
             self.dealt["driver"] += 1
@@ -118,7 +118,7 @@ class Blows:
 
     def raylet(self, process: subprocess.Popen[bytes]) -> None:
         """Kill Ray itself below a driver, if it runs by now."""
-        self.seen.update(victims.below(process.pid))
+        self.seen.update(victims.births(victims.below(process.pid)))
         for pid in victims.raylets(process.pid):
             self.dealt["raylet"] += victims.kill(pid)
 

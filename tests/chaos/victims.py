@@ -51,15 +51,22 @@ def kill(pid: int) -> bool:
     return False
 
 
-def wait_until_gone(pids: set[int], seconds: float) -> set[int]:
+def births(pids: list[int]) -> set[tuple[int, str]]:
+    """Processes by id and start time, for Linux gives an id to another process before long."""
+    return {(pid, born) for pid in pids if (born := _born(pid))}
+
+
+def wait_until_gone(processes: set[tuple[int, str]], seconds: float) -> set[tuple[int, str]]:
     """The processes that still live when the time is over, or none as soon as that is so."""
     deadline = time.monotonic() + seconds
-    while (left := {pid for pid in pids if _lives(pid)}) and time.monotonic() < deadline:
+    while (left := {each for each in processes if _born(each[0]) == each[1]}) and time.monotonic() < deadline:
         time.sleep(0.05)
     return left
 
 
-def _lives(pid: int) -> bool:
+def _born(pid: int) -> str:
+    """When a process started, in ticks since the machine did; "" when it has ended."""
     with suppress(OSError):
-        return (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    return False
+        fields = (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()
+        return "" if fields[0] in "ZX" else fields[19]
+    return ""
