@@ -16,6 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
+from cluster.files import replacing
 from cluster.tracking.runs import Tracker, unusable
 
 SQLITE = "sqlite:///"
@@ -43,11 +44,20 @@ def open_tracker(settings: TrackingSettings) -> Tracker:
         database = Path(uri.removeprefix(SQLITE)).expanduser().absolute()
         uri = f"{SQLITE}{database}"
         with _alone(database):
-            client = MlflowClient(uri)
             artifacts = (database.parent / "mlruns").as_uri()
+            if not database.exists():
+                _create(database, settings.experiment, artifacts)
+            client = MlflowClient(uri)
             return Tracker(client, uri, _experiment(client, settings.experiment, artifacts))
     except (MlflowException, SQLAlchemyError, OSError) as error:
         raise unusable(uri, error) from error
+
+
+def _create(database: Path, experiment: str, artifacts: str) -> None:
+    """Makes the tables elsewhere first: MLflow refuses for ever a database whose making was cut short."""
+    with replacing(database) as unfinished:
+        unfinished.unlink(missing_ok=True)
+        _experiment(MlflowClient(f"{SQLITE}{unfinished}"), experiment, artifacts)
 
 
 def _experiment(client: MlflowClient, name: str, artifacts: str | None) -> str:

@@ -176,6 +176,33 @@ def test_commands_that_create_a_store_at_once_share_one_experiment(tmp_path):
     assert first == second
 
 
+@pytest.mark.slow
+def test_a_store_whose_making_was_killed_is_made_anew(tmp_path):
+    """Killed again and again, each time a little later, until one making comes to its end."""
+    code = (
+        "import sys; from cluster.config import TrackingSettings; from cluster.tracking import open_tracker; "
+    )
+    code += "open_tracker(TrackingSettings(uri=sys.argv[1]))"
+    uri, kills, seconds = f"sqlite:///{tmp_path}/mlflow.db", 0, 0.0
+    while True:
+        making = subprocess.Popen([sys.executable, "-c", code, uri], cwd=REPOSITORY)
+        while making.poll() is None and not list(tmp_path.glob("*.db")):
+            time.sleep(0.01)
+        try:
+            assert making.wait(seconds) == 0
+            break
+        except subprocess.TimeoutExpired:
+            making.kill()
+            making.wait()
+            kills, seconds = kills + 1, seconds + 0.3
+    assert kills > 2
+    tracker = open_tracker(TrackingSettings(uri=uri))
+    assert [path.name for path in tmp_path.glob("*.db")] == ["mlflow.db"]
+    with tracker.run("after all", "collect", {}) as run:
+        pass
+    assert record(tracker, run).info.run_name == "after all"
+
+
 @pytest.fixture
 def served(settings, tracker, free_port):
     """`svaedc ui` in a process of its own, with one run to show: the process and its page."""
