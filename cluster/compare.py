@@ -11,14 +11,13 @@ from cluster.comparison_report import FIGURE, PAGE, SUMMARY, lines, publish, sum
 from cluster.comparison_runs import Standing, Watch, submit
 from cluster.comparison_tracking import Note, TrackedComparison, begin, note_in
 from cluster.config import CompareSettings
-from cluster.errors import UserError
 from cluster.grid import Grid
 from cluster.options import usage_errors
 from cluster.progress import ProgressLine, say
 from cluster.results import TABLE, RunKey, all_runs, recorded, seeds_in
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
-from svaedc import checkpoint
+from cluster.trained_model import trained_model
 from svaedc.comparison import Trial
 from svaedc.summaries import Summary
 from workers.dataset.shards import sha256
@@ -164,15 +163,8 @@ def usable(model: Path, setup: Setup) -> tuple[Path, str]:
     Raises:
         UserError: it cannot be read, or was trained on another one.
     """
-    path = model / "model.pt" if model.is_dir() else model
-    try:
-        _, metadata = checkpoint.load(path)
-        twin = robots.stands_in_for(setup.name)
-        trained_on = twin if metadata.get("setup") == twin else setup.name
-        checkpoint.require(path, metadata, {"setup": trained_on})
-    except (FileNotFoundError, ValueError) as error:
-        raise UserError(f"cannot use the model: {error}") from error
-    return path, trained_on
+    found = trained_model(model, setup.name, robots.stands_in_for(setup.name))
+    return found.path, str(found.metadata["setup"])
 
 
 def _is_finished(plan: _Plan, note: Note) -> bool:

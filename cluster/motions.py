@@ -15,7 +15,7 @@ from cluster.film import STILLS, Picture, mosaic, write
 from cluster.options import setup_of
 from cluster.progress import ProgressLine, say
 from cluster.render import Moment, stills, summary
-from svaedc import checkpoint
+from cluster.trained_model import trained_model
 from svaedc.model import SvaeDc
 from svaedc.renditions import Rendition, remarkable, renditions
 from workers.dataset.cache import TrainingCache
@@ -113,12 +113,10 @@ def beside(
     Raises:
         UserError: there is no such model, or it is of another setup.
     """
-    path = folder / "model.pt" if folder.is_dir() else folder
+    found = trained_model(folder, setup.name)
     try:
-        model, metadata = checkpoint.load(path)
-        checkpoint.require(path, metadata, {"setup": setup.name})
-        shown = telling(summary(setup, episode), episode, model, metadata["stride"])
-    except (FileNotFoundError, ValueError) as error:
+        shown = telling(summary(setup, episode), episode, found.model, found.metadata["stride"])
+    except ValueError as error:
         raise UserError(f"cannot use the model: {error}") from error
     rows = _counted(strips(setup, shown, moments, size), len(moments))
     blocks = iter([list(rows)]) if kind in STILLS else ([row] for row in rows)

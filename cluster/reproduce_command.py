@@ -13,31 +13,40 @@ _SCALE_HELP = (
 )
 
 
+Figure = Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13.")]
+Folder = Annotated[
+    Path, typer.Option("--folder", help="Of data, models and results; shared by figures.", callback=durable)
+]
+ScaleName = Annotated[str, typer.Option("--scale", help=_SCALE_HELP)]
+Episodes = Annotated[
+    int | None, typer.Option("--episodes", min=200, help="To collect, instead of the scale's.")
+]
+Runs = Annotated[
+    int | None, typer.Option("--runs", min=1, max=1000, help="Of each method, instead of the paper's.")
+]
+Given = Annotated[
+    Path | None, typer.Option("--dataset", help="Collected already; used as it is.", callback=durable)
+]
+Models = Annotated[
+    list[Path] | None,
+    typer.Option("--model", help="Trained already; may be repeated, one of each latent size."),
+]
+Plan = Annotated[bool, typer.Option("--plan", help="Only say what it will cost.")]
+
+
 def reproduce(
-    figure: Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13.")],
-    folder: Annotated[
-        Path,
-        typer.Option("--folder", help="Of data, models and results; shared by figures.", callback=durable),
-    ] = Path("reproduction"),
-    scale: Annotated[str, typer.Option("--scale", help=_SCALE_HELP)] = "machine",
-    episodes: Annotated[
-        int | None, typer.Option("--episodes", min=200, help="To collect, instead of the scale's.")
-    ] = None,
-    runs: Annotated[
-        int | None, typer.Option("--runs", min=1, max=1000, help="Of each method, instead of the paper's.")
-    ] = None,
-    dataset: Annotated[
-        Path | None, typer.Option("--dataset", help="Collected already; used as it is.", callback=durable)
-    ] = None,
-    model: Annotated[
-        list[Path] | None,
-        typer.Option("--model", help="Trained already; may be repeated, one of each latent size."),
-    ] = None,
+    figure: Figure,
+    folder: Folder = Path("reproduction"),
+    scale: ScaleName = "machine",
+    episodes: Episodes = None,
+    runs: Runs = None,
+    dataset: Given = None,
+    model: Models = None,
     config: Config = None,
     overrides: Overrides = None,
     address: Address = None,
     *,
-    plan: Annotated[bool, typer.Option("--plan", help="Only say what it will cost.")] = False,
+    plan: Plan = False,
 ) -> None:
     """Make a figure of the paper: collect, train, compare, and hold the numbers against what it claims.
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from cluster.config import Settings, TrainSettings
 from cluster.errors import UserError
 from cluster.recipe import NINE, Panel, Recipe, Scale
+from cluster.trained_model import trained_model
 from cluster.training_record import MEASURES
-from svaedc import checkpoint
 from svaedc.presets import Sizes, preset
 from workers import setups
 from workers.dataset.folder import Dataset, open_dataset
@@ -162,10 +162,5 @@ def _given(recipe: Recipe, models: tuple[Path, ...]) -> dict[str, Path]:
 
 def _latent(folder: Path, setup: str) -> str:
     """Steps x dimensions of a model's latent path."""
-    path = folder / "model.pt" if folder.is_dir() else folder
-    try:
-        model, metadata = checkpoint.load(path)
-        checkpoint.require(path, metadata, {"setup": setup})
-    except (FileNotFoundError, ValueError) as error:
-        raise UserError(f"cannot use the model: {error}") from error
-    return f"{model.config.path_length}x{model.config.tau_dim}"
+    config = trained_model(folder, setup).model.config
+    return f"{config.path_length}x{config.tau_dim}"

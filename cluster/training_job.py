@@ -26,7 +26,7 @@ from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
 from workers.dataset.location import Location
 
-MODEL = "model.pt"
+MODEL = checkpoint.FILE
 STATE = "training.pt"
 
 

@@ -5,11 +5,9 @@ knows nothing of controllers first, and then p(tau, psi|x) alone, fitted to its 
 with a standard prior, or one without a KL term. `python -m studies.appendix_a --dataset data/franka`
 """
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from statistics import mean, stdev
 from typing import final
 
@@ -17,7 +15,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from studies.cells import Result, Study, results, table, written
+from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
 from svaedc.distributions import FAMILIES, Diagonal
 from svaedc.model import SvaeDc
@@ -113,15 +111,11 @@ def _columns(found: Sequence[Result]) -> list[list[float]]:
 
 def main() -> None:
     """Compute the cells that are missing, then write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True)
-    parser.add_argument("--out", type=Path, default=Path("study-results/appendix-a"))
-    parser.add_argument("--cache", default=str(Path("~/.cache/svaedc").expanduser()))
+    parser = arguments(__doc__, "appendix-a")
     parser.add_argument("--episodes", type=int, default=8_000)
     parser.add_argument("--updates", type=int, default=1_500)
     parser.add_argument("--networks", choices=sorted(SECONDS_PER_UPDATE), default="compact")
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args()
     source = Source(given.dataset, given.cache)
     dataset, cache = source.opened()

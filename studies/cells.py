@@ -1,5 +1,6 @@
 """The cells of a study: each is computed once, in a process of one thread, and kept as a line of JSON."""
 
+import argparse
 import json
 import os
 import sys
@@ -44,6 +45,16 @@ class Study:
             file.write("\n" * (file.tell() > 0) + json.dumps({"cell": asdict(cell), "result": result}))
             file.flush()
             os.fsync(file.fileno())
+
+
+def arguments(description: str | None, folder: str) -> argparse.ArgumentParser:
+    """What every study is told: its dataset, and where and with how many processes it works."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--dataset", required=True)
+    parser.add_argument("--out", type=Path, default=Path("study-results") / folder)
+    parser.add_argument("--cache", default=str(Path("~/.cache/svaedc").expanduser()))
+    parser.add_argument("--processes", type=int, default=1)
+    return parser
 
 
 def name(cell: Mapping[str, Any]) -> str:

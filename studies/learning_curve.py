@@ -4,7 +4,6 @@ Subsets are nested. Every model gets the same number of updates. `python -m stud
 data/franka` leaves a table and a figure, and says what more episodes would buy if the curve went on.
 """
 
-import argparse
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.cells import Result, Study, results, table, written
+from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train, worths
 
 SMALLEST = 2_000
@@ -88,13 +87,9 @@ def draw(path: Path, cells: Sequence[Cell], found: Sequence[Result]) -> None:
 
 def main() -> None:
     """Compute the cells that are missing, then write the table and the figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True)
-    parser.add_argument("--out", type=Path, default=Path("study-results/learning-curve"))
-    parser.add_argument("--cache", default=str(Path("~/.cache/svaedc").expanduser()))
+    parser = arguments(__doc__, "learning-curve")
     parser.add_argument("--updates", type=int, default=4_000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args()
     source = Source(given.dataset, given.cache)
     dataset, cache = source.opened()

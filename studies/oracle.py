@@ -5,7 +5,6 @@ q(tau, psi|xi, y), which has seen the trajectory itself and so is an oracle, or 
 `python -m studies.oracle --dataset data/franka --model models/franka`
 """
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -18,7 +17,7 @@ from jaxtyping import Float, Float32
 from matplotlib.figure import Figure
 from torch import Tensor
 
-from studies.cells import Result, Study, results, table, written
+from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source
 from svaedc import checkpoint, methods
 from svaedc.candidates import Problem
@@ -174,18 +173,14 @@ def rows_of(found: Mapping[tuple[str, float], Result]) -> list[list[str]]:
 
 def main() -> None:
     """Compute the cells that are missing, then write the table and the figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True)
+    parser = arguments(__doc__, "oracle")
     parser.add_argument("--model", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("study-results/oracle"))
-    parser.add_argument("--cache", default=str(Path("~/.cache/svaedc").expanduser()))
     parser.add_argument("--candidates", type=int, default=2_000)
     parser.add_argument("--runs", type=int, default=50)
-    parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args()
     source = Source(given.dataset, given.cache)
     dataset, _ = source.opened()
-    path = given.model / "model.pt" if given.model.is_dir() else given.model
+    path = checkpoint.located(given.model)
     what = (sha256(path), dataset.fingerprint(), given.candidates, given.runs)
     kinds = [(RANDOM, 0.0), *((method, share) for share in SHARES for method in METHODS)]
     cells = [Cell(*what, *kind) for kind in kinds]

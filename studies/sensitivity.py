@@ -5,7 +5,6 @@ own, unless another cell has the same, and simulated runs of `svae-dc` and `rand
 `python -m studies.sensitivity --dataset data/franka`
 """
 
-import argparse
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -18,7 +17,7 @@ from matplotlib.figure import Figure
 
 from cluster.comparison_job import ComparisonJob
 from cluster.results import RunKey, recorded, rows
-from studies.cells import Result, Study, results, table, written
+from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
 from svaedc import checkpoint
 from svaedc.episodes import Episodes
@@ -171,13 +170,9 @@ def row(label: str, result: Result) -> Sequence[str]:
 
 def main() -> None:
     """Compute the cells that are missing, then write the table and the figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True)
-    parser.add_argument("--out", type=Path, default=Path("study-results/sensitivity"))
-    parser.add_argument("--cache", default=str(Path("~/.cache/svaedc").expanduser()))
+    parser = arguments(__doc__, "sensitivity")
     parser.add_argument("--updates", type=int, default=4_000)
     parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args()
     source = Source(str(Path(given.dataset).absolute()), given.cache)
     dataset, cache = source.opened()

@@ -11,6 +11,9 @@ import torch
 from svaedc.architecture import ModelConfig
 from svaedc.model import SvaeDc
 
+FILE: Final = "model.pt"
+"""Name of a trained model's checkpoint in its folder."""
+
 FORMAT: Final = 1
 CPU: Final = torch.device("cpu")
 
@@ -32,6 +35,11 @@ def save(path: Path, model: SvaeDc, metadata: dict[str, Any]) -> None:
             "metadata": metadata,
         },
     )
+
+
+def located(path: Path) -> Path:
+    """The checkpoint that a user names by itself or by its folder."""
+    return path / FILE if path.is_dir() else path
 
 
 def load(path: Path, device: torch.device = CPU) -> tuple[SvaeDc, dict[str, Any]]:

@@ -55,9 +55,10 @@ def start(
     from cluster.hardware.plan import Plan, identify
     from cluster.session import connect
     from cluster.tracking import open_tracker
+    from svaedc.checkpoint import located
 
     settings = settings_of(config, overrides)
-    checkpoint = model / "model.pt" if model is not None and model.is_dir() else model
+    checkpoint = located(model) if model else None
     plan = Plan(
         identify(robot, method, trials, seed, _pool(settings.hardware), checkpoint, approval),
         folder,

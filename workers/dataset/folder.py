@@ -47,8 +47,8 @@ class Dataset:
 
     def sane_episodes(self) -> int:
         """How many of them a model may learn from: all but the diverged ones."""
-        diverged = sum(read_stops(self.path(shard)).count(DIVERGED) for shard in self.shards())
-        return self.episodes() - diverged
+        stops = (read_stops(self.path(shard), self.identity) for shard in self.shards())
+        return self.episodes() - sum(each.count(DIVERGED) for each in stops)
 
     def size(self) -> int:
         """Bytes of the finished shards."""

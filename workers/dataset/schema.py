@@ -226,14 +226,13 @@ def _table(path: Location, identity: Identity, names: list[str]) -> pa.Table:
         return file.read(columns=names)
 
 
-def read_stops(path: Location) -> tuple[str, ...]:
+def read_stops(path: Location, identity: Identity) -> tuple[str, ...]:
     """The stop reasons of a file's episodes, without reading the rest.
 
     Raises:
-        ValueError: when the file is damaged.
+        ValueError: as `read_outcomes` does.
     """
-    with _damage_named(path):
-        return tuple(pq.read_table(source(path), columns=["stop"])["stop"].to_pylist())
+    return tuple(_table(path, identity, ["stop"])["stop"].to_pylist())
 
 
 @contextmanager

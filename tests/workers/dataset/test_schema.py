@@ -36,7 +36,7 @@ def test_more_episodes_than_a_row_group_keep_their_order(tmp_path, identity, epi
     schema.write(path, identity, 0, episodes_of(identity, range(150)))
     assert schema.read(path, identity).episode.tolist() == list(range(150))
     assert pq.ParquetFile(path).num_row_groups == 3
-    assert schema.read_stops(path) == schema.read(path, identity).stop
+    assert schema.read_stops(path, identity) == schema.read(path, identity).stop
 
 
 def test_a_stranger_with_pandas_understands_the_file(file, identity, episodes_of):
