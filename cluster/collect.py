@@ -44,6 +44,7 @@ def collect(
     identity = _identity(setup, seed, repeats, settings)
     dataset, plan = planned(identity, episodes, folder)
     if not plan:
+        release(dataset)  # a driver that was killed at its end may have put aside what another collected
         say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
         return dataset
     actors = min(settings.actor_count(session.cpus), len(plan))

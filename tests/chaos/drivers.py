@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -20,13 +21,15 @@ from workers.dataset.folder import MANIFEST, Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import sweep_digests
 from workers.dataset.publication import WRITING, writer
-from workers.dataset.shards import Shard
+from workers.dataset.shards import Shard, present
 
 REPOSITORY = Path(__file__).parents[2]
 SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 6000
 """Rollouts that cost next to nothing, in 1,500 files: what kills hit is starting, writing and publishing."""
 PATIENCE = 600.0
 """Seconds after which something that must end is taken to hang."""
+FILES_BETWEEN, SECONDS_BETWEEN = 60, 3.0
+"""Fewer files than that are finished between two kills, unless so many seconds pass, as in a start."""
 
 
 def collected_here(folder: Path, episodes: int = EPISODES) -> Dataset:
@@ -56,12 +59,26 @@ def command(folder: Path, store: Path, *options: str) -> list[str]:
     ]
 
 
-def start(arguments: list[str], log: Path, **environment: str) -> subprocess.Popen[bytes]:
-    """A driver, whose words are appended to a log."""
-    with log.open("ab") as output:
-        return subprocess.Popen(
-            arguments, cwd=REPOSITORY, env={**os.environ, **environment}, stdout=output, stderr=output
-        )
+class Drivers:
+    """The drivers of a test, none of which outlives it."""
+
+    def __init__(self) -> None:
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def start(self, arguments: list[str], log: Path) -> subprocess.Popen[bytes]:
+        """A driver, whose words are appended to a log."""
+        with log.open("ab") as output:
+            process = subprocess.Popen(arguments, cwd=REPOSITORY, stdout=output, stderr=output)
+        self._started.append(process)
+        return process
+
+    def end(self) -> None:
+        """Kill what a failed test left running."""
+        for process in self._started:
+            if process.poll() is None:
+                for pid in [process.pid, *victims.below(process.pid)]:
+                    victims.kill(pid)
+                process.wait()
 
 
 @dataclass
@@ -90,6 +107,18 @@ class Blows:
         """A random while."""
         time.sleep(self.rng.uniform(0.0, longest))
 
+    def pause(self, folder: Path, is_over: Callable[[], bool]) -> None:
+        """Wait for some more files in a folder: a busy machine gets as far between kills as an idle one.
+
+        Args:
+            folder: of the dataset.
+            is_over: whether there is nothing to wait for any more.
+        """
+        enough = len(present(folder)) + self.rng.integers(FILES_BETWEEN)
+        deadline = time.monotonic() + self.rng.uniform(0.0, SECONDS_BETWEEN)
+        while len(present(folder)) < enough and time.monotonic() < deadline and not is_over():
+            time.sleep(0.05)
+
     def actor(self, root: int) -> bool:
         """Kill one of the rollout processes below a process; False when there is none."""
         pids = victims.actors(root)
@@ -117,7 +146,9 @@ class Blows:
         process.wait()
 
     def raylet(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill Ray itself below a driver, if it runs by now."""
+        """Kill Ray itself below a driver as soon as it runs, unless the driver ends before."""
+        while process.poll() is None and not victims.raylets(process.pid):
+            time.sleep(0.02)
         self.seen.update(victims.births(victims.below(process.pid)))
         for pid in victims.raylets(process.pid):
             self.dealt["raylet"] += victims.kill(pid)

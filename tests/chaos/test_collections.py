@@ -16,6 +16,7 @@ from tests.chaos import victims
 from tests.chaos.drivers import (
     PATIENCE,
     Blows,
+    Drivers,
     begun,
     collected_here,
     command,
@@ -23,7 +24,6 @@ from tests.chaos.drivers import (
     require_part,
     require_same,
     seed,
-    start,
 )
 from tests.cluster.conftest import MACHINE
 from workers.dataset.folder import MANIFEST
@@ -32,7 +32,8 @@ pytestmark = pytest.mark.chaos
 
 ALONE, TOGETHER = 110, 110
 """Kills of one driver with Ray of its own, and of two on a cluster."""
-BLOWS_OF_A_LIFE = 12
+BLOWS_OF_A_LIFE, BLOWS_OF_A_PAIR = 24, 50
+"""The most that one driver's actors may get, and that two may before they are left in peace."""
 DISKS = 4
 EXPECTED_ENDS = (
     *("Ray has ended on this machine", "Ray cannot start here"),
@@ -53,16 +54,16 @@ def small(size: int, folder: Path, out: Path, arguments: list[str]) -> list[str]
     return ["unshare", "-r", "-m", "sh", "-c", shell, "sh", str(size), str(folder), str(out), *arguments]
 
 
-def lived(driver: subprocess.Popen, blows: Blows) -> int:
+def lived(driver: subprocess.Popen, folder: Path, blows: Blows) -> int:
     """Kill the actors of a driver, then it or its Ray or nothing; returns how it ended."""
-    longest, many = blows.rng.choice([0.0, 1.0]), int(blows.rng.integers(BLOWS_OF_A_LIFE))
-    last = blows.rng.choice(["driver", "raylet", "nothing"], p=[0.7, 0.1, 0.2])
+    many = int(blows.rng.choice([0, blows.rng.integers(1, BLOWS_OF_A_LIFE)], p=[0.25, 0.75]))
+    last = blows.rng.choice(["driver", "raylet", "nothing"], p=[0.5, 0.35, 0.15])
     blows.wait(8.0)  # somewhere in its start
     deadline = time.monotonic() + PATIENCE
     while many and driver.poll() is None:
         assert time.monotonic() < deadline
+        blows.pause(folder, lambda: driver.poll() is not None)
         many -= blows.actor(driver.pid)
-        blows.wait(longest + 0.1)
     if last != "nothing":
         getattr(blows, last)(driver)
     return driver.wait(PATIENCE)
@@ -75,13 +76,13 @@ def require_explained(code: int, log: Path) -> None:
     assert code <= 0 or any(reason in said for reason in EXPECTED_ENDS), said
 
 
-def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed):
+def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed, drivers):
     blows, finished, unfinished = Blows(tmp_path, seed()), 0, None
     print(f"CHAOS_SEED={blows.seed}")
     while blows.dealt.total() < ALONE or not finished:
         folder, log = tmp_path / f"dataset-{finished}", tmp_path / f"after-{blows.dealt.total()}-kills.log"
         unfinished = unfinished or begun(folder)
-        code = lived(start(command(folder, tmp_path / "mlflow.db"), log), blows)
+        code = lived(drivers.start(command(folder, tmp_path / "mlflow.db"), log), folder, blows)
         require_explained(code, log)
         require_part(folder, undisturbed)
         if published(folder).keys() == undisturbed.keys():
@@ -97,18 +98,22 @@ def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed):
 class Pair:
     """Two drivers on one dataset, each started again whenever it was killed or has given up."""
 
-    def __init__(self, folder: Path, address: str, log: Path) -> None:
+    def __init__(self, drivers: Drivers, folder: Path, address: str, log: Path) -> None:
+        self._drivers = drivers
         self._commands = [
             command(folder, log.with_suffix(f".{seat}.db"), "--address", address) for seat in range(2)
         ]
         self._log = log
-        self.seats = [start(command, log) for command in self._commands]
+        self.seats = [drivers.start(command, log) for command in self._commands]
 
-    def tend(self) -> bool:
-        """Start again what has not reached the end; whether one has."""
+    def tend(self) -> None:
+        """Start again what has not reached the end."""
         for seat, process in enumerate(self.seats):
             if process.poll() not in (None, 0):
-                self.seats[seat] = start(self._commands[seat], self._log)
+                self.seats[seat] = self._drivers.start(self._commands[seat], self._log)
+
+    def is_over(self) -> bool:
+        """Whether one of the two has reached the end."""
         return any(process.poll() == 0 for process in self.seats)
 
     def end(self) -> None:
@@ -122,37 +127,39 @@ class Pair:
 
 def deal(blows: Blows, pair: Pair, machines: Cluster, others: list[Node]) -> None:
     """One blow to something that two drivers need: mostly an actor, at times a driver or a machine."""
-    kind, seat = blows.rng.choice(["actor", "driver", "machine"], p=[0.84, 0.1, 0.06]), blows.rng.integers(2)
+    kind, seat = blows.rng.choice(["actor", "driver", "machine"], p=[0.8, 0.12, 0.08]), blows.rng.integers(2)
     if kind == "actor":
         blows.actor(os.getpid())
     elif kind == "driver":
         blows.driver(pair.seats[seat])
     else:
         machines.remove_node(others.pop(seat), allow_graceful=False)
-        others.append(machines.add_node(num_cpus=4, **MACHINE))
-        blows.dealt["raylet"] += 1
+        blows.dealt["machine"] += 1
+        others.append(machines.add_node(wait=False, num_cpus=4, **MACHINE))
 
 
-def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(tmp_path, undisturbed, machines):
+def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(
+    tmp_path, undisturbed, machines, drivers
+):
     blows, finished = Blows(tmp_path, seed()), 0
     print(f"CHAOS_SEED={blows.seed}")
     others = [machines.add_node(num_cpus=4, **MACHINE) for _ in range(2)]
-    while blows.dealt.total() < TOGETHER or not finished:
+    while blows.dealt.total() < TOGETHER:
         folder, log = tmp_path / f"dataset-{finished}", tmp_path / f"pair-{finished}.log"
-        unfinished = begun(folder)
-        pair, deadline = Pair(folder, machines.address, log), time.monotonic() + PATIENCE
-        while not pair.tend():
-            assert time.monotonic() < deadline, log.read_text()
-            blows.wait(1.0)
+        unfinished, enough = begun(folder), blows.dealt.total() + BLOWS_OF_A_PAIR
+        pair = Pair(drivers, folder, machines.address, log)
+        while not pair.is_over() and blows.dealt.total() < enough:
+            blows.pause(folder, pair.is_over)
             deal(blows, pair, machines, others)
+            pair.tend()
         pair.end()
         assert "Traceback" not in log.read_text()
         require_same(folder, undisturbed, [unfinished])
         finished += 1
-    print(f"{blows}; {finished} collections finished by two drivers at once")
+        print(f"{blows}; {finished} collections finished by two drivers at once")
 
 
-def test_no_size_of_a_full_disk_loses_or_changes_a_byte(tmp_path, undisturbed):
+def test_no_size_of_a_full_disk_loses_or_changes_a_byte(tmp_path, undisturbed, drivers):
     disk = tmp_path / "disk"
     disk.mkdir()
     tried = subprocess.run(small(8, disk, tmp_path, ["true"]), capture_output=True, text=True, check=False)
@@ -164,12 +171,12 @@ def test_no_size_of_a_full_disk_loses_or_changes_a_byte(tmp_path, undisturbed):
         out, log = tmp_path / f"dataset-{number}", tmp_path / f"disk-{number}.log"
         out.mkdir()
         arguments = small(size, disk, out, command(disk, tmp_path / "mlflow.db"))
-        assert start(arguments, log).wait(PATIENCE) == 1
+        assert drivers.start(arguments, log).wait(PATIENCE) == 1
         assert "No space left on device" in log.read_text()
         assert "Traceback" not in log.read_text()
         assert not list(out.glob(".writing/*"))
         if (out / MANIFEST).exists():
             require_part(out, undisturbed)
         print(f"full at {size} kB: {len(list(out.glob('*.parquet')))} shards safe")
-    assert start(command(out, tmp_path / "mlflow.db"), log).wait(PATIENCE) == 0, log.read_text()
+    assert drivers.start(command(out, tmp_path / "mlflow.db"), log).wait(PATIENCE) == 0, log.read_text()
     require_same(out, undisturbed, [])

@@ -117,6 +117,15 @@ def test_extending_rewrites_nothing_and_asking_again_does_nothing(
     assert "nothing to do" in capsys.readouterr().err
 
 
+def test_a_shard_that_was_put_aside_and_then_collected_by_another_driver_leaves_no_trace(
+    ray_session, tracking_settings, tmp_path
+):
+    dataset = collected(tmp_path / "dataset", 4, ray_session, tracking_settings)
+    errors = put_aside(dataset, dataset.shards()[0], ["its worker process died"])
+    collected(tmp_path / "dataset", 4, ray_session, tracking_settings)
+    assert not errors.exists()
+
+
 def test_a_folder_of_another_dataset_is_refused_naming_the_field(ray_session, tracking_settings, tmp_path):
     collected(tmp_path / "dataset", 4, ray_session, tracking_settings)
     with pytest.raises(UserError, match=r"differ in seed: 3 and 4"):

@@ -17,7 +17,7 @@ from workers.dataset.location import Location
 WRITING = ".writing"
 """Folder, below the dataset, of files that are not finished."""
 
-_WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)")
+_WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)(?:_(?P<born>\d+))?")
 
 
 @contextmanager
@@ -79,8 +79,13 @@ def synchronise(path: Location) -> None:
 
 
 def writer() -> str:
-    """The suffix of this process's temporary files: host, boot and process id."""
-    return f"{host()}.{_boot()}.{os.getpid()}"
+    """The suffix of this process's temporary files: host, boot, process id, and start where Linux tells it.
+
+    Ids are given again, on a busy machine within minutes; no two processes share id and start.
+    """
+    pid = os.getpid()
+    born = _born(pid)
+    return f"{host()}.{_boot()}.{pid}{born and '_'}{born}"
 
 
 def host() -> str:
@@ -96,7 +101,7 @@ def is_dead(name: str) -> bool:
     match = _WRITER.fullmatch(name)
     if match is None or match["host"] != host():
         return False
-    return match["boot"] != _boot() or not _alive(int(match["pid"]))
+    return match["boot"] != _boot() or not _alive(int(match["pid"]), match["born"] or "")
 
 
 def wait_for_end(writers: Iterable[str], seconds: float) -> None:
@@ -112,23 +117,34 @@ def wait_for_end(writers: Iterable[str], seconds: float) -> None:
         time.sleep(0.02)
 
 
-def _alive(pid: int) -> bool:
+def _alive(pid: int, born: str) -> bool:
+    """Whether the process that began then, if that is known, is still there.
+
+    One that has ended and only waits for its parent, which in a container may never ask, is not.
+    """
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
     except PermissionError:
-        return True
-    return not _is_zombie(pid)
+        pass  # it is another user's, so it lives
+    state, begun = _state(pid)
+    return state != "Z" and begun in {"", born or begun}
 
 
-def _is_zombie(pid: int) -> bool:
-    """Whether a process has ended and only waits for its parent, which in a container may never ask."""
+def _born(pid: int) -> str:
+    """When a process began, in ticks since the machine did; "" where nobody tells."""
+    return _state(pid)[1]
+
+
+def _state(pid: int) -> tuple[str, str]:
+    """A process's state, as a letter, and when it began; empty texts where nobody tells."""
     try:
-        # The name, in brackets, may hold anything; the state follows it.
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        # The name, in brackets, may hold anything; the state follows it, and 19 further on the start.
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return fields[0], fields[19]
     except (OSError, IndexError):
-        return False
+        return "", ""
 
 
 def _boot() -> str:

@@ -186,10 +186,14 @@ def test_sweeping_spares_living_writers_and_those_of_other_machines(tmp_path):
         f"{SHARD.name}.elsewhere.{boot}.{gone.pid}",
         "somebody's notes",
     ]
-    dead = [f"{SHARD.name}.{host}.{boot}.{gone.pid}", f"{SHARD.name}.{host}.another-boot.{os.getpid()}"]
+    dead = [
+        f"{SHARD.name}.{host}.{boot}.{gone.pid}",
+        f"{SHARD.name}.{host}.another-boot.{os.getpid()}",
+        f"{SHARD.name}.{host}.{boot}.{os.getpid()}_1",  # of a process that had this one's id before it
+    ]
     for name in (*living, *dead):
         (writing / name).write_bytes(b"half")
-    assert shards.sweep(tmp_path) == 2
+    assert shards.sweep(tmp_path) == len(dead)
     assert sorted(path.name for path in writing.iterdir()) == sorted(living)
 
 
