@@ -2,11 +2,17 @@
 
 import pytest
 
-from tests.chaos.drivers import Drivers
+from tests.chaos.drivers import Drivers, collected_here, published
 from tests.cluster.conftest import machines
 from tests.cluster.hardware.conftest import processes
 
-__all__ = ["drivers", "machines", "processes"]
+__all__ = ["drivers", "machines", "processes", "undisturbed"]
+
+
+@pytest.fixture(scope="session")
+def undisturbed(tmp_path_factory):
+    """The files of a collection without faults."""
+    return published(collected_here(tmp_path_factory.mktemp("undisturbed") / "dataset").folder)
 
 
 @pytest.fixture

@@ -24,11 +24,11 @@ from workers.dataset.publication import WRITING, writer
 from workers.dataset.shards import Shard, present
 
 REPOSITORY = Path(__file__).parents[2]
-SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 6000
-"""Rollouts that cost next to nothing, in 1,500 files: what kills hit is starting, writing and publishing."""
+SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 2400
+"""Rollouts that cost next to nothing, in 600 files: what kills hit is starting, writing and publishing."""
 PATIENCE = 600.0
 """Seconds after which something that must end is taken to hang."""
-FILES_BETWEEN, SECONDS_BETWEEN = 60, 3.0
+FILES_BETWEEN, SECONDS_BETWEEN = 24, 3.0
 """Fewer files than that are finished between two kills, unless so many seconds pass, as in a start."""
 
 
@@ -126,7 +126,7 @@ class Blows:
         if not pids or not victims.kill(pid := sorted(pids)[int(draw * len(pids))]):
             return False
         self.dealt["actor"] += 1
-        self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{pid}")))
+        self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{pid}_*")))
         return True
 
     def writer(self, process: BaseProcess) -> None:
@@ -135,7 +135,7 @@ class Blows:
         process.join()
         if process.exitcode == -signal.SIGKILL:
             self.dealt["writer"] += 1
-            self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{process.pid}")))
+            self.unfinished += bool(list(self.folder.glob(f"*/{WRITING}/*.{process.pid}_*")))
 
     def driver(self, process: subprocess.Popen[bytes]) -> None:
         """Kill a driver, unless it has ended."""

@@ -18,7 +18,6 @@ from tests.chaos.drivers import (
     Blows,
     Drivers,
     begun,
-    collected_here,
     command,
     published,
     require_part,
@@ -26,7 +25,6 @@ from tests.chaos.drivers import (
     seed,
 )
 from tests.cluster.conftest import MACHINE
-from workers.dataset.folder import MANIFEST
 
 pytestmark = pytest.mark.chaos
 
@@ -34,24 +32,10 @@ ALONE, TOGETHER = 110, 110
 """Kills of one driver with Ray of its own, and of two on a cluster."""
 BLOWS_OF_A_LIFE, BLOWS_OF_A_PAIR = 24, 50
 """The most that one driver's actors may get, and that two may before they are left in peace."""
-DISKS = 4
 EXPECTED_ENDS = (
     *("Ray has ended on this machine", "Ray cannot start here"),
     *("shards kept failing", "no worker process could start"),
 )
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    """The files of a collection without faults."""
-    return published(collected_here(tmp_path_factory.mktemp("undisturbed") / "dataset").folder)
-
-
-def small(size: int, folder: Path, out: Path, arguments: list[str]) -> list[str]:
-    """A command in a name space of its own, where a folder is a disk of so many kB; then it is copied out."""
-    shell = 'mount -t tmpfs -o size="$1k" tmpfs "$2" && from="$2" to="$3" && shift 3 && "$@"; code=$?; '
-    shell += 'cp -a "$from/." "$to" && exit $code'
-    return ["unshare", "-r", "-m", "sh", "-c", shell, "sh", str(size), str(folder), str(out), *arguments]
 
 
 def lived(driver: subprocess.Popen, folder: Path, blows: Blows) -> int:
@@ -157,26 +141,3 @@ def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(
         require_same(folder, undisturbed, [unfinished])
         finished += 1
         print(f"{blows}; {finished} collections finished by two drivers at once")
-
-
-def test_no_size_of_a_full_disk_loses_or_changes_a_byte(tmp_path, undisturbed, drivers):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    tried = subprocess.run(small(8, disk, tmp_path, ["true"]), capture_output=True, text=True, check=False)
-    if tried.returncode:
-        pytest.skip(f"a small disk cannot be mounted here, even in a name space: {tried.stderr.strip()}")
-    blows = Blows(tmp_path, seed())
-    print(f"CHAOS_SEED={blows.seed}")
-    for number, size in enumerate(blows.rng.integers(8, 4000, size=DISKS)):
-        out, log = tmp_path / f"dataset-{number}", tmp_path / f"disk-{number}.log"
-        out.mkdir()
-        arguments = small(size, disk, out, command(disk, tmp_path / "mlflow.db"))
-        assert drivers.start(arguments, log).wait(PATIENCE) == 1
-        assert "No space left on device" in log.read_text()
-        assert "Traceback" not in log.read_text()
-        assert not list(out.glob(".writing/*"))
-        if (out / MANIFEST).exists():
-            require_part(out, undisturbed)
-        print(f"full at {size} kB: {len(list(out.glob('*.parquet')))} shards safe")
-    assert drivers.start(command(out, tmp_path / "mlflow.db"), log).wait(PATIENCE) == 0, log.read_text()
-    require_same(out, undisturbed, [])

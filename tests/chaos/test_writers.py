@@ -21,12 +21,6 @@ LIFE_SECONDS = 0.25
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    """The files of a collection without faults."""
-    return published(collected_here(tmp_path_factory.mktemp("undisturbed") / "dataset", EPISODES).folder)
-
-
-@pytest.fixture(scope="module")
 def context():
     """Processes that start in milliseconds: forked from a server that has imported everything."""
     context = multiprocessing.get_context("forkserver")
@@ -35,8 +29,9 @@ def context():
 
 
 @pytest.mark.chaos
-def test_no_kill_of_writers_changes_a_byte_whatever_they_were_writing(tmp_path, undisturbed, context):
+def test_no_kill_of_writers_changes_a_byte_whatever_they_were_writing(tmp_path, context):
     """Two at a time on one dataset, each of which sweeps and goes on where the killed ones were."""
+    undisturbed = published(collected_here(tmp_path / "undisturbed", EPISODES).folder)
     blows, finished, unfinished, longest = Blows(tmp_path, seed()), 0, None, LIFE_SECONDS
     print(f"CHAOS_SEED={blows.seed}")
     while blows.dealt.total() < KILLS or not finished:
