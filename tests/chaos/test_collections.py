@@ -28,7 +28,7 @@ from tests.cluster.conftest import MACHINE
 
 pytestmark = pytest.mark.chaos
 
-ALONE, TOGETHER = 110, 110
+ALONE, TOGETHER = 100, 100
 """Kills of one driver with Ray of its own, and of two on a cluster."""
 BLOWS_OF_A_LIFE, BLOWS_OF_A_PAIR = 24, 50
 """The most that one driver's actors may get, and that two may before they are left in peace."""
@@ -75,7 +75,7 @@ def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed, d
         if code == 0:
             require_same(folder, undisturbed, [unfinished])
             unfinished, finished = None, finished + 1
-    print(f"{blows}; {finished} collections finished")
+            print(f"{blows}; {finished} collections finished")
     assert victims.wait_until_gone(blows.seen, 60.0) == set()
 
 
