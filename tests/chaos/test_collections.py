@@ -6,6 +6,7 @@ The kills are drawn from a seed that is printed: CHAOS_SEED=N make chaos draws t
 import os
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,15 @@ class Pair:
             time.sleep(0.1)
 
 
+def joined(machines: Cluster) -> Node:
+    """One machine more. Ray gives up one that starts for half a minute, as it may on a busy machine."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        with suppress(Exception):  # Ray raises bare ones
+            return machines.add_node(wait=False, num_cpus=4, **MACHINE)
+    raise TimeoutError("no machine could be added to the cluster")
+
+
 def deal(blows: Blows, pair: Pair, machines: Cluster, others: list[Node]) -> None:
     """One blow to something that two drivers need: mostly an actor, at times a driver or a machine."""
     kind, seat = blows.rng.choice(["actor", "driver", "machine"], p=[0.8, 0.12, 0.08]), blows.rng.integers(2)
@@ -119,7 +129,7 @@ def deal(blows: Blows, pair: Pair, machines: Cluster, others: list[Node]) -> Non
     else:
         machines.remove_node(others.pop(seat), allow_graceful=False)
         blows.dealt["machine"] += 1
-        others.append(machines.add_node(wait=False, num_cpus=4, **MACHINE))
+        others.append(joined(machines))
 
 
 def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(
@@ -127,7 +137,7 @@ def test_no_kill_of_two_drivers_or_a_machine_on_a_cluster_changes_a_byte(
 ):
     blows, finished = Blows(tmp_path, seed()), 0
     print(f"CHAOS_SEED={blows.seed}")
-    others = [machines.add_node(num_cpus=4, **MACHINE) for _ in range(2)]
+    others = [joined(machines) for _ in range(2)]
     while blows.dealt.total() < TOGETHER:
         folder, log = tmp_path / f"dataset-{finished}", tmp_path / f"pair-{finished}.log"
         unfinished, enough = begun(folder), blows.dealt.total() + BLOWS_OF_A_PAIR
