@@ -20,6 +20,8 @@ from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
+START_SECONDS = 120
+"""What Ray may take to start on this machine. By itself it gives up after 30, too few on a busy one."""
 TOKEN_REMEDY = (
     "put the cluster's token into ~/.ray/auth_token, or name its file in RAY_AUTH_TOKEN_PATH, "
     "and set RAY_AUTH_MODE=token"
@@ -99,6 +101,7 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster."""
     _stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
+    _have_patience()
     try:
         ray.init(
             address="local",
@@ -205,6 +208,12 @@ def _bound_logs(size: int) -> None:
     """Two files of that many bytes per stream of a process; otherwise Ray lets a worker's output grow."""
     os.environ["RAY_ROTATION_MAX_BYTES"] = str(size)
     os.environ["RAY_ROTATION_BACKUP_COUNT"] = "1"
+
+
+def _have_patience() -> None:
+    """Waits longer for Ray to start, unless the user's environment says how long."""
+    os.environ.setdefault("RAY_raylet_start_wait_time_s", str(START_SECONDS))
+    Config.initialize("")  # it was read when Ray was imported
 
 
 def _stay_on_loopback() -> None:
