@@ -20,7 +20,7 @@ from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
-START_SECONDS = 120
+START_SECONDS = 60
 """What Ray may take to start on this machine. By itself it gives up after 30, too few on a busy one."""
 TOKEN_REMEDY = (
     "put the cluster's token into ~/.ray/auth_token, or name its file in RAY_AUTH_TOKEN_PATH, "

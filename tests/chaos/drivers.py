@@ -146,9 +146,10 @@ class Blows:
         process.wait()
 
     def raylet(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill Ray itself below a driver as soon as it runs, unless the driver ends before."""
+        """Kill Ray itself below a driver some time after it began to run, unless the driver ends before."""
         while process.poll() is None and not victims.raylets(process.pid):
             time.sleep(0.02)
+        self.wait(SECONDS_BETWEEN)
         self.seen.update(victims.births(victims.below(process.pid)))
         for pid in victims.raylets(process.pid):
             self.dealt["raylet"] += victims.kill(pid)
