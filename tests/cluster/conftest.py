@@ -67,7 +67,9 @@ def machines(monkeypatch):
     Its head has no CPUs; it wants no token.
     """
     monkeypatch.delenv("RAY_AUTH_TOKEN")
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, **MACHINE})
+    # Ray leaves a socket open where the port is taken, as its usual one is while another cluster runs here.
+    head = {"num_cpus": 0, "dashboard_port": free_ports(1)[0], **MACHINE}
+    cluster = Cluster(initialize_head=True, head_node_args=head)
     yield cluster
     cluster.shutdown()
 
