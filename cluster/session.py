@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import ray
 from ray._private import ray_constants
@@ -15,6 +16,7 @@ from ray._private.services import find_bootstrap_address
 from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
 from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 
+from cluster import economies
 from cluster.config import Part, RaySettings
 from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
@@ -100,22 +102,32 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     _stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
     try:
-        ray.init(
-            address="local",
-            num_cpus=None if settings.num_cpus == "all" else settings.num_cpus,
-            resources={"hardware": 1},
-            object_store_memory=settings.object_store_memory,
-            include_dashboard="dashboard" in parts,
-            dashboard_host=LOOPBACK,
-            log_to_driver=False,
-            logging_level=logging.ERROR,
-            _temp_dir=str(settings.temporary_folder),
-        )
+        if "dashboard" in parts:
+            _initialise(settings, include_dashboard=True)
+        else:
+            with economies.quiet_agent():
+                _initialise(settings, include_dashboard=False, _system_config=economies.settings())
+            economies.end_spectators()
     except Exception as error:  # Ray raises bare ones, as when a busy machine is slow to start it
         raise UserError(
             f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
             "which --set ray.temporary_folder=DIR moves"
         ) from error
+
+
+def _initialise(settings: RaySettings, **more: Any) -> None:
+    """Starts Ray with the arguments that all clusters share, and those given."""
+    ray.init(
+        address="local",
+        num_cpus=None if settings.num_cpus == "all" else settings.num_cpus,
+        resources={"hardware": 1},
+        object_store_memory=settings.object_store_memory,
+        dashboard_host=LOOPBACK,
+        log_to_driver=False,
+        logging_level=logging.ERROR,
+        _temp_dir=str(settings.temporary_folder),
+        **more,
+    )
 
 
 def _join(settings: RaySettings, wanted: str) -> None:
