@@ -22,6 +22,10 @@ from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
+ATTEMPTS = 3
+"""To start a cluster on a machine that is too busy for it."""
+TOO_SLOW = "timed out during startup"
+"""What Ray then says."""
 TOKEN_REMEDY = (
     "put the cluster's token into ~/.ray/auth_token, or name its file in RAY_AUTH_TOKEN_PATH, "
     "and set RAY_AUTH_MODE=token"
@@ -98,21 +102,30 @@ def _session(*, is_local: bool) -> Session:
 
 
 def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
-    """Starts a cluster."""
+    """Starts a cluster; a busy machine may need longer than the half minute that Ray grants itself."""
     _stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
-    try:
-        if "dashboard" in parts:
-            _initialise(settings, include_dashboard=True)
-        else:
-            with economies.quiet_agent():
-                _initialise(settings, include_dashboard=False, _system_config=economies.settings())
-            economies.end_spectators()
-    except Exception as error:  # Ray raises bare ones, as when a busy machine is slow to start it
-        raise UserError(
-            f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
-            "which --set ray.temporary_folder=DIR moves"
-        ) from error
+    for further in reversed(range(ATTEMPTS)):
+        try:
+            _start_parts(settings, parts)
+            break
+        except Exception as error:  # Ray raises bare ones
+            if further and TOO_SLOW in str(error):
+                continue
+            raise UserError(
+                f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
+                "which --set ray.temporary_folder=DIR moves"
+            ) from error
+
+
+def _start_parts(settings: RaySettings, parts: tuple[Part, ...]) -> None:
+    """Starts a cluster with these parts only."""
+    if "dashboard" in parts:
+        _initialise(settings, include_dashboard=True)
+        return
+    with economies.quiet_agent():
+        _initialise(settings, include_dashboard=False, _system_config=economies.settings())
+    economies.end_spectators()
 
 
 def _initialise(settings: RaySettings, **more: Any) -> None:
