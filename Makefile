@@ -26,8 +26,14 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP) ## the whole pipeline, small and real: collect, train, compare
 	$(BIN)/svaedc demo
 
+# Tests of clusters and servers wait more than they compute: the others run beside them, and are shown afterwards.
+CLUSTERS := tests/cluster tests/end_to_end
+COMPUTING := .pytest_cache/computing.log
 test: $(STAMP) ## the tests that take seconds each
-	$(BIN)/python -m pytest
+	@mkdir -p $(dir $(COMPUTING))
+	@$(BIN)/python -m pytest tests $(CLUSTERS:%=--ignore=%) > $(COMPUTING) 2>&1 & computing=$$!; \
+	$(BIN)/python -m pytest $(CLUSTERS); clusters=$$?; \
+	wait $$computing; computed=$$?; cat $(COMPUTING); exit $$((clusters + computed))
 
 test-slow: $(STAMP) ## the tests that take minutes, and the property tests with fresh examples
 	HYPOTHESIS_PROFILE=exploring $(BIN)/python -m pytest -m "slow or hypothesis"

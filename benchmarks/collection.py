@@ -40,7 +40,7 @@ KINDS = {
 
 
 class Meter:
-    """CPU seconds and memory of this process and all below it, sampled until `stop`."""
+    """CPU seconds and memory of this process and all below it, sampled until `stop`; without its own."""
 
     def __init__(self):
         self.driver = psutil.Process()
@@ -49,6 +49,7 @@ class Meter:
         self.driver_rss: list[int] = []
         self.actor_pss: dict[int, int] = {}
         self.first = self.sample()
+        self._own = 0.0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
@@ -82,6 +83,7 @@ class Meter:
                 with suppress(psutil.NoSuchProcess):
                     pss = psutil.Process(pid).memory_full_info().pss
                     self.actor_pss[pid] = max(pss, self.actor_pss.get(pid, 0))
+        self._own = time.thread_time()
 
     def stop(self) -> dict[str, float]:
         """CPU seconds since the meter began, by kind, of all processes that were seen."""
@@ -91,6 +93,7 @@ class Meter:
         for pid, seconds in self.sample().items():
             name = self.kinds[pid]
             spent[name] = spent.get(name, 0.0) + seconds - self.first.get(pid, 0.0)
+        spent["driver"] -= self._own
         return spent
 
 

@@ -12,7 +12,8 @@ from cluster.comparison_report import FIGURE, PAGE
 from cluster.files import replacing
 from cluster.recipe import Recipe
 from cluster.reproduction import Reproduction
-from svaedc.claims import Claim, Finding
+from svaedc.claims import Claim
+from svaedc.evidence import Finding
 from svaedc.summaries import Summary
 
 _HEADER = ("the paper", "where", "measured here", "value, 90 % interval", "runs", "verdict")

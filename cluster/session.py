@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import ray
 from ray._private import ray_constants
@@ -15,13 +16,16 @@ from ray._private.services import find_bootstrap_address
 from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
 from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 
+from cluster import economies
 from cluster.config import Part, RaySettings
 from cluster.errors import UsageError, UserError
 from cluster.termination import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
-START_SECONDS = 60
-"""What Ray may take to start on this machine. By itself it gives up after 30, too few on a busy one."""
+ATTEMPTS = 3
+"""To start a cluster on a machine that is too busy for it."""
+TOO_SLOW = "timed out during startup"
+"""What Ray then says."""
 TOKEN_REMEDY = (
     "put the cluster's token into ~/.ray/auth_token, or name its file in RAY_AUTH_TOKEN_PATH, "
     "and set RAY_AUTH_MODE=token"
@@ -98,27 +102,45 @@ def _session(*, is_local: bool) -> Session:
 
 
 def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
-    """Starts a cluster."""
+    """Starts a cluster; a busy machine may need longer than the half minute that Ray grants itself."""
     _stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
-    _have_patience()
-    try:
-        ray.init(
-            address="local",
-            num_cpus=None if settings.num_cpus == "all" else settings.num_cpus,
-            resources={"hardware": 1},
-            object_store_memory=settings.object_store_memory,
-            include_dashboard="dashboard" in parts,
-            dashboard_host=LOOPBACK,
-            log_to_driver=False,
-            logging_level=logging.ERROR,
-            _temp_dir=str(settings.temporary_folder),
-        )
-    except Exception as error:  # Ray raises bare ones, as when a busy machine is slow to start it
-        raise UserError(
-            f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
-            "which --set ray.temporary_folder=DIR moves"
-        ) from error
+    for further in reversed(range(ATTEMPTS)):
+        try:
+            _start_parts(settings, parts)
+            break
+        except Exception as error:  # Ray raises bare ones
+            if further and TOO_SLOW in str(error):
+                continue
+            raise UserError(
+                f"Ray cannot start here: {error}; its logs are in {settings.temporary_folder}, "
+                "which --set ray.temporary_folder=DIR moves"
+            ) from error
+
+
+def _start_parts(settings: RaySettings, parts: tuple[Part, ...]) -> None:
+    """Starts a cluster with these parts only."""
+    if "dashboard" in parts:
+        _initialise(settings, include_dashboard=True)
+        return
+    with economies.quiet_agent():
+        _initialise(settings, include_dashboard=False, _system_config=economies.settings())
+    economies.end_spectators()
+
+
+def _initialise(settings: RaySettings, **more: Any) -> None:
+    """Starts Ray with the arguments that all clusters share, and those given."""
+    ray.init(
+        address="local",
+        num_cpus=None if settings.num_cpus == "all" else settings.num_cpus,
+        resources={"hardware": 1},
+        object_store_memory=settings.object_store_memory,
+        dashboard_host=LOOPBACK,
+        log_to_driver=False,
+        logging_level=logging.ERROR,
+        _temp_dir=str(settings.temporary_folder),
+        **more,
+    )
 
 
 def _join(settings: RaySettings, wanted: str) -> None:
@@ -208,12 +230,6 @@ def _bound_logs(size: int) -> None:
     """Two files of that many bytes per stream of a process; otherwise Ray lets a worker's output grow."""
     os.environ["RAY_ROTATION_MAX_BYTES"] = str(size)
     os.environ["RAY_ROTATION_BACKUP_COUNT"] = "1"
-
-
-def _have_patience() -> None:
-    """Waits longer for Ray to start, unless the user's environment says how long."""
-    os.environ.setdefault("RAY_raylet_start_wait_time_s", str(START_SECONDS))
-    Config.initialize("")  # it was read when Ray was imported
 
 
 def _stay_on_loopback() -> None:

@@ -72,9 +72,8 @@ def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Belief:
 
 
 def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Belief:
-    r"""k_0 on g(\bar y) \bar\tau / s, with one lengthscale: whitening has made the dimensions equal."""
-    latents = problem.known_badness()
-    return _on_latents(Whitened.over(latents.tau, latents.y), lambda _: kernel(1), problem)
+    r"""k_0 on (1 - \bar y) \bar\tau / s."""
+    return _on_latents(Whitened.over(problem.known_badness().tau), kernel, problem)
 
 
 def on_screened_paths(kernel: KernelOf, problem: Problem) -> Belief:

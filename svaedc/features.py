@@ -92,31 +92,24 @@ class Sigmoid:
 
 @dataclass(frozen=True, eq=False)
 class Whitened:
-    r"""phi(x) = g(\bar y_x) \bar\tau_x / s: our variant of dynamic compression.
+    r"""phi(x) = (1 - \bar y_x) \bar\tau_x / s: our variant of dynamic compression.
 
-    s holds the standard deviation of each latent dimension over simulated controllers, and g rescales the
-    goodness 1 - \bar y so that the worst of them has 0 and the best 1. The latent path is not centred, so
-    that bad controllers meet in the origin, as in the paper, and not at the mean controller.
+    s holds the standard deviation of each latent dimension over simulated controllers: a fit of lengthscales
+    to a handful of trials begins where all dimensions count the same. The latent path is not centred, so that
+    bad controllers meet in the origin, as in the paper, and not at the mean controller.
 
     Attributes:
         s: Scale of each latent dimension.
-        worst: Largest predicted badness, where g is 0.
-        best: Smallest predicted badness, where g is 1.
     """
 
     s: Float[Tensor, " k"]
-    worst: float
-    best: float
 
     @classmethod
-    def over(cls, tau: Float[Tensor, "n k"], y: Float[Tensor, " n"]) -> "Whitened":
-        """The statistics of simulated controllers, at least two."""
+    def over(cls, tau: Float[Tensor, "n k"]) -> "Whitened":
+        """The spread of simulated controllers, at least two."""
         spread = tau.std(dim=0)
-        s = spread.clamp_min(max(_LEAST_SCALE * float(spread.max()), torch.finfo(tau.dtype).tiny))
-        return cls(s, worst=float(y.max()), best=float(y.min()))
+        return cls(spread.clamp_min(max(_LEAST_SCALE * float(spread.max()), torch.finfo(tau.dtype).tiny)))
 
     def __call__(self, tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:
-        """The features of any controllers; beyond the worst and the best simulated one, g stays 0 and 1."""
-        range_of_y = max(self.worst - self.best, torch.finfo(tau.dtype).tiny)
-        g = ((self.worst - y) / range_of_y).clamp(0, 1)
-        return g.unsqueeze(-1) * tau / self.s
+        """The features of any controllers."""
+        return svae_dc(tau / self.s, y)

@@ -86,6 +86,7 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
         runs=len(runs.run),
         incomplete=runs.incomplete,
         best=tuple(map(estimate, runs.best.T)),
+        median_best=_medians(runs.best),
         objective=estimate(_mean_of_rows(f)),
         first_success=_first_success(runs.success, reporting),
         successful_runs=estimate(runs.success.any(axis=1).astype(float)),
@@ -93,6 +94,10 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
         broken_trials=estimate(_mean_of_rows(np.where(np.isnan(f), math.nan, f < reporting.broken_below))),
         failed_trials=estimate(_mean_of_rows(np.isnan(f).astype(float))),
     )
+
+
+def _medians(best: Float[np.ndarray, "runs trials"]) -> tuple[float, ...]:
+    return tuple(np.median(best, axis=0).tolist()) if len(best) else (math.nan,) * best.shape[1]
 
 
 def _first_success(success: Bool[np.ndarray, "runs trials"], reporting: Reporting) -> FirstSuccess:

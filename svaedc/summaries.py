@@ -77,6 +77,7 @@ class MethodSummary:
         runs: Complete runs.
         incomplete: Runs left out because trials are missing.
         best: Best objective so far, at each trial.
+        median_best: Median over runs of the same; NaN while a run has none.
         objective: Mean objective of the trials the method suggested.
         first_success: Suggested trials until the task counts as solved.
         successful_runs: Share of runs with a success.
@@ -88,6 +89,7 @@ class MethodSummary:
     runs: int
     incomplete: int
     best: tuple[Estimate, ...]
+    median_best: tuple[float, ...]
     objective: Estimate
     first_success: FirstSuccess
     successful_runs: Estimate

@@ -6,7 +6,8 @@ from cluster.costs import comparing, training
 from cluster.recipe import Panel, Recipe
 from cluster.recipes import RECIPES, SCALES, recipe, scale
 from svaedc import methods
-from svaedc.claims import Claim, Gain
+from svaedc.claims import Claim
+from svaedc.evidence import Gain
 from svaedc.variants import LATENT_SIZES
 from workers import setups
 from workers.hardware import robots

@@ -20,8 +20,9 @@ from cluster.reproduction_report import publish, table
 from cluster.results import RunKey, append
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
-from svaedc.claims import Claim, Gain, Successes
+from svaedc.claims import Claim
 from svaedc.comparison import Trial
+from svaedc.evidence import Gain, Successes
 from svaedc.model import SvaeDc
 from svaedc.presets import Sizes, compact
 from svaedc.statistics import summarise

@@ -58,6 +58,21 @@ with connect(RaySettings(num_cpus=1, log_file_bytes=500_000), None):
     print("out", max(path.stat().st_size for path in logs.glob("worker-*.out*")))
 """
 
+SLOW_ONCE = """
+import ray
+from cluster.config import RaySettings
+from cluster.session import connect
+start, refused = ray.init, []
+def busy(**arguments):
+    if refused:
+        return start(**arguments)
+    refused.append(arguments)
+    raise Exception("The current node timed out during startup. This could happen because ...")
+ray.init = busy
+with connect(RaySettings(num_cpus=1), None, ()) as session:
+    print("started", session.cpus, len(refused))
+"""
+
 
 def join(head, address, **environment) -> str:
     """What a new process prints when it joins, with the given variables and no others about Ray."""
@@ -110,6 +125,13 @@ def test_auto_without_a_cluster_says_how_to_start_one(tmp_path):
     settings = RaySettings(temporary_folder=tmp_path)
     with pytest.raises(UserError, match="ray start --head"), connect(settings, "auto"):
         pass
+
+
+@pytest.mark.slow
+def test_a_machine_too_busy_to_start_a_cluster_at_once_is_asked_again():
+    """Ray's words for it, without the half minute that a machine would have to be too busy for."""
+    answer = subprocess.run([sys.executable, "-c", SLOW_ONCE], capture_output=True, text=True, timeout=180)
+    assert answer.stdout.strip() == "started 1 1"
 
 
 def connect_to(address):

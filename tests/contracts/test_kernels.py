@@ -43,7 +43,7 @@ def compressed(outer, embedding):
     return Case(lambda: kernels.compressed(outer(K), embedding), paths_and_badness)
 
 
-WHITENED = Whitened(torch.tensor([0.5, 1.0, 2.0]).double(), worst=1.0, best=0.0)
+WHITENED = Whitened(torch.tensor([0.5, 1.0, 2.0]).double())
 COMPRESSED = {
     "svae-dc": compressed(kernels.se, svae_dc),
     "svae-dc-matern": compressed(kernels.matern, svae_dc),

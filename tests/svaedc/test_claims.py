@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from svaedc.claims import Claim, Evidence, Gain, Like, Steadier, Successes
+from svaedc.claims import Claim
+from svaedc.evidence import Evidence, Gain, Like, MedianGap, Steadier, Successes
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row
 
@@ -54,6 +55,11 @@ PANELS = {
         (Successes("left", "good", "runs", 0.0, 0.4), "does not hold"),
         (Successes("left", "bad", "trials", 0.0, 0.04), "holds"),
         (Successes("left", "absent", "runs", 0.0, 1.0), "not measured"),
+        (MedianGap("left", "good", 1.0, 3, high=0.5), "holds"),
+        (MedianGap("left", "good", 1.0, 3, high=0.3), "does not hold"),
+        (MedianGap("left", "good", 1.0, 3, low=0.5), "does not hold"),
+        (MedianGap("left", "good", 1.0, 4), "not measured"),
+        (MedianGap("left", "absent", 1.0, 3), "not measured"),
         (Steadier("tight", "left", "good"), "holds"),
         (Steadier("left", "tight", "good"), "does not hold"),
         (Steadier("tight", "left", "bad"), "not measured"),
@@ -86,6 +92,14 @@ def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_without_an_interval():
     assert math.isnan(found.value.low)
 
 
+def test_the_gap_is_that_of_the_median_run_and_not_of_the_mean():
+    runs = panel({"mostly": [0.5, 0.5, 10.0]})
+    found = MedianGap("it", "mostly", 12.0, 3, low=1.0).found({"it": runs}, INITIAL)
+    assert (found.value.mean, found.runs, found.verdict) == (11.5, 3, "holds")
+    before_any = MedianGap("it", "mostly", 12.0, 0, low=1.0).found({"it": runs}, INITIAL)
+    assert before_any.value.mean == 13.0
+
+
 def test_one_run_leaves_a_gain_open():
     alone = {"it": panel({"good": [0.9], "bad": [0.1]})}
     assert Gain("it", "good", "bad", 3).found(alone, INITIAL).verdict == "open"
@@ -96,6 +110,7 @@ def test_every_measure_says_what_it_is_about():
     assert Gain("left", "good", "bad", 3, high=2.5).measure == "good − bad ≤ 2.5, best after 3"
     assert Like("left", "good", "bad", 3).measure == "good − bad ≈ 0, best after 3"
     assert Successes("left", "good", "runs", 0.0, 1.0).measure == "good, share of runs with a success"
+    assert MedianGap("left", "good", 12.0, 3, low=2.5).measure == "good, median gap to 12 ≥ 2.5, best after 3"
     assert Steadier("tight", "left", "good").measure == "good, width of the last interval, tight / left"
 
 

@@ -1,0 +1,243 @@
+"""Numbers that decide what a paper claims of its methods, taken from comparisons, each with a verdict."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal, Protocol, runtime_checkable
+
+from svaedc.intervals import Estimate
+from svaedc.summaries import Difference, MethodSummary, Summary
+
+Verdict = Literal["holds", "does not hold", "open", "not measured"]
+Panels = Mapping[str, Summary]
+"""The comparisons of a figure, by the name of their panel."""
+
+NOTHING: Final = Estimate(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was measured, and what it says of a claim.
+
+    Attributes:
+        value: The number the claim is about, with its 90 % interval.
+        runs: It is a mean over so many.
+        verdict: "open" where the interval leaves both answers possible.
+    """
+
+    value: Estimate
+    runs: int
+    verdict: Verdict
+
+
+UNKNOWN: Final = Finding(NOTHING, 0, "not measured")
+
+
+@runtime_checkable
+class Evidence(Protocol):
+    """A number that decides a claim."""
+
+    @property
+    def panel(self) -> str:
+        """Name of the panel it is taken from."""
+        ...
+
+    @property
+    def measure(self) -> str:
+        """What the number is, in words."""
+        ...
+
+    def found(self, panels: Panels, initial: int) -> Finding:
+        """The number in these comparisons, whose runs began with so many shared random trials."""
+        ...
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A method's best objective so far minus a baseline's, over shared seeds, lies in a range.
+
+    Attributes:
+        panel: Name of the panel.
+        method: The one that gains.
+        baseline: The other one.
+        after: Suggested trials.
+        low: Smallest gain that agrees with the claim; 0 says that the method is better.
+        high: Largest gain.
+    """
+
+    panel: str
+    method: str
+    baseline: str
+    after: int
+    low: float = 0.0
+    high: float = math.inf
+
+    @property
+    def measure(self) -> str:
+        """Method minus baseline, and the end of the range that is not 0."""
+        most = f" ≤ {self.high:g}" if self.high < math.inf else ""
+        return f"{self.method} − {self.baseline}{most}, best after {self.after}"
+
+    def found(self, panels: Panels, initial: int) -> Finding:
+        """Holds if the whole interval of the paired difference lies in the range, fails if none of it."""
+        return _judged(self, panels, initial, self._verdict)
+
+    def _verdict(self, value: Estimate) -> Verdict:
+        if self.low < value.low and value.high < self.high:
+            return "holds"
+        return "does not hold" if value.high < self.low or self.high < value.low else "open"
+
+
+@dataclass(frozen=True)
+class Like:
+    """A method's best objective so far is not told apart from a baseline's, over shared seeds.
+
+    Few runs tell hardly anything apart, so a claim of this kind means as much as the interval is narrow.
+
+    Attributes:
+        panel: Name of the panel.
+        method: One.
+        baseline: The other one.
+        after: Suggested trials.
+    """
+
+    panel: str
+    method: str
+    baseline: str
+    after: int
+
+    @property
+    def measure(self) -> str:
+        """Method minus baseline, which is said to be 0."""
+        return f"{self.method} − {self.baseline} ≈ 0, best after {self.after}"
+
+    def found(self, panels: Panels, initial: int) -> Finding:
+        """Holds if the interval of the paired difference includes 0."""
+        return _judged(self, panels, initial, _includes_zero)
+
+
+@dataclass(frozen=True)
+class Successes:
+    """The share of runs, or of suggested trials, with a success lies in a range.
+
+    Attributes:
+        panel: Name of the panel.
+        method: Whose runs.
+        among: What is counted.
+        low: Smallest share that agrees with the claim.
+        high: Largest share.
+    """
+
+    panel: str
+    method: str
+    among: Literal["runs", "trials"]
+    low: float
+    high: float
+
+    @property
+    def measure(self) -> str:
+        """Whose share, and of what."""
+        return f"{self.method}, share of {self.among} with a success"
+
+    def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
+        """Holds if the measured share lies in the range; its interval decides nothing."""
+        method = _method(panels.get(self.panel), self.method)
+        if method is None:
+            return UNKNOWN
+        share = method.successful_runs if self.among == "runs" else method.successful_trials
+        return Finding(
+            share, method.runs, "holds" if self.low <= share.mean <= self.high else "does not hold"
+        )
+
+
+@dataclass(frozen=True)
+class MedianGap:
+    """What the median run lacks to the optimum lies in a range.
+
+    Attributes:
+        panel: Name of the panel.
+        method: Whose runs.
+        optimum: Largest objective there is.
+        after: Suggested trials.
+        low: Smallest gap that agrees with the claim.
+        high: Largest one.
+    """
+
+    panel: str
+    method: str
+    optimum: float
+    after: int
+    low: float = 0.0
+    high: float = math.inf
+
+    @property
+    def measure(self) -> str:
+        """Whose gap, and the end of the range that is not without meaning."""
+        limit = f" ≤ {self.high:g}" if self.high < math.inf else f" ≥ {self.low:g}"
+        return f"{self.method}, median gap to {self.optimum:g}{limit}, best after {self.after}"
+
+    def found(self, panels: Panels, initial: int) -> Finding:
+        """Holds if the median lies in the range; it has no interval."""
+        method, index = _method(panels.get(self.panel), self.method), initial + self.after - 1
+        if method is None or index >= len(method.median_best):
+            return UNKNOWN
+        gap = self.optimum - method.median_best[index]
+        verdict: Verdict = "holds" if self.low <= gap <= self.high else "does not hold"
+        return Finding(Estimate(gap, math.nan, math.nan), method.runs, verdict)
+
+
+@dataclass(frozen=True)
+class Steadier:
+    """A method's runs end closer together in one panel than in another.
+
+    Attributes:
+        panel: Where they are said to be closer.
+        than: Name of the other panel.
+        method: Whose runs.
+    """
+
+    panel: str
+    than: str
+    method: str
+
+    @property
+    def measure(self) -> str:
+        """Ratio of widths."""
+        return f"{self.method}, width of the last interval, {self.panel} / {self.than}"
+
+    def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
+        """Holds if the ratio is below 1; the ratio has no interval of its own."""
+        found = [_method(panels.get(name), self.method) for name in (self.panel, self.than)]
+        if not all(method and method.runs > 1 for method in found):
+            return UNKNOWN
+        narrow, wide = (method.best[-1].high - method.best[-1].low for method in found if method)
+        ratio = narrow / wide if wide else math.inf
+        runs = min(method.runs for method in found if method)
+        return Finding(Estimate(ratio, math.nan, math.nan), runs, "holds" if ratio < 1 else "does not hold")
+
+
+def _judged(
+    evidence: Gain | Like, panels: Panels, initial: int, verdict: Callable[[Estimate], Verdict]
+) -> Finding:
+    difference = _difference(panels.get(evidence.panel), evidence.method, evidence.baseline)
+    index = initial + evidence.after - 1
+    if difference is None or not difference.runs or index >= len(difference.best):
+        return UNKNOWN
+    value = difference.best[index]
+    # One run has no interval.
+    return Finding(value, difference.runs, "open" if math.isnan(value.low) else verdict(value))
+
+
+def _method(summary: Summary | None, method: str) -> MethodSummary | None:
+    found = summary.methods.get(method) if summary else None
+    return found if found and found.runs else None
+
+
+def _difference(summary: Summary | None, method: str, baseline: str) -> Difference | None:
+    differences = summary.differences if summary else ()
+    wanted = (method, baseline)
+    return next((each for each in differences if (each.method, each.baseline) == wanted), None)
+
+
+def _includes_zero(value: Estimate) -> Verdict:
+    return "holds" if value.low <= 0 <= value.high else "does not hold"
