@@ -145,6 +145,7 @@ def test_more_actors_than_cpus_are_refused_before_anything_starts(ray_session, t
         )
 
 
+@pytest.mark.slow
 def test_a_killed_driver_is_continued_to_the_same_bytes(tmp_path):
     folder, store = tmp_path / "dataset", tmp_path / "mlflow.db"
     with subprocess.Popen(

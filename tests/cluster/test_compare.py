@@ -283,6 +283,7 @@ def test_an_explicit_gap_is_recorded_by_its_ranges_however_they_are_written(comp
         compared("random", gap="object2_mass=2.1", runs=1)
 
 
+@pytest.mark.slow
 def test_the_model_belongs_to_a_comparison_from_the_first_method_that_needs_one(compared, tmp_path):
     one, other = untrained(tmp_path / "one"), untrained(tmp_path / "other", seed=1)
     compared("random", runs=1)
@@ -382,6 +383,7 @@ def disk_with_room_for(tmp_path):
     subprocess.run(["umount", "--lazy", str(small)], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small file system")
 def test_a_full_disk_ends_a_comparison_with_nothing_lost(compared, disk_with_room_for, tmp_path):
     small = disk_with_room_for("40k")
@@ -426,6 +428,7 @@ def test_a_store_that_fails_meanwhile_costs_no_run_and_is_caught_up_with(compare
     assert {run.info.status for run in parents + children} == {"FINISHED"}
 
 
+@pytest.mark.slow
 def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_run(compared, tmp_path, capfd):
     few = CompareSettings(slots=2, pool_size=3)
     with pytest.raises(UserError, match=r"1 of 2 runs kept failing.*ValueError: all 3 candidates .* tried"):

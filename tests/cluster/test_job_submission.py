@@ -59,6 +59,7 @@ def test_a_submitted_collection_succeeds_and_its_log_can_be_read(job, tmp_path):
     assert "20 episodes" in job("logs", "collection")
 
 
+@pytest.mark.slow
 def test_a_stopped_collection_keeps_whole_shards(job, tmp_path):
     submit(job, "long", tmp_path, 100_000, "--no-wait")
     deadline = time.monotonic() + 300

@@ -138,6 +138,7 @@ def test_two_processes_learn_what_one_does(run_train):
     assert measured[0]["rec_norm"] == pytest.approx(measured[1]["rec_norm"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half_way, ends):
     assert checkpoint.load(half_way)[1]["update"] == 20
     path = run_train()
@@ -199,6 +200,7 @@ def test_a_model_that_is_not_finished_says_that_the_command_goes_on(capsys):
     assert "after 40 of 80 updates; the same command goes on" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_training_that_died_before_its_last_file_still_leaves_a_model(run_train, finished):
     before = weights(finished)
     finished.unlink()

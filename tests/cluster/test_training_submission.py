@@ -48,6 +48,7 @@ def job(franka_dataset, tmp_path) -> TrainingJob:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ray_session")
 def test_two_processes_train_one_model(job, tmp_path):
     def save_copy(config):
@@ -72,6 +73,7 @@ def test_two_processes_train_one_model(job, tmp_path):
         assert torch.equal(other[name], value)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ray_session")
 def test_a_dataset_that_grew_since_the_plan_ends_training_at_the_first_try(tracking_settings, job, capsys):
     planned = replace(job, origin={**job.origin, "dataset": "0" * 64})
