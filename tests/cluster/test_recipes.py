@@ -7,7 +7,7 @@ from cluster.recipe import Panel, Recipe
 from cluster.recipes import RECIPES, SCALES, recipe, scale
 from svaedc import methods
 from svaedc.claims import Claim
-from svaedc.evidence import Gain
+from svaedc.evidence import Gain, MedianGap
 from svaedc.variants import LATENT_SIZES
 from workers import setups
 from workers.hardware import robots
@@ -34,6 +34,16 @@ def test_the_franka_figure_has_a_panel_of_each_kind():
     assert (left.latent, middle.latent, right.latent) == ("3x3", "5x6", "3x3")
     assert RECIPES["figure-9"].latents == ("3x3", "5x6")
     assert {"matern", "svae-matern", "svae-dc-matern"} <= set(right.methods)
+
+
+def test_gaps_are_measured_from_the_optima_of_the_formulas_in_parts_of_their_ranges():
+    claims = RECIPES["figure-13"].claims
+    gaps = {e.panel: e for claim in claims for e in claim.evidence if isinstance(e, MedianGap)}
+    for panel in RECIPES["figure-13"].panels:
+        low, high = setups.load(panel.setup).objective_limits
+        assert gaps[panel.name].optimum == pytest.approx(high)
+        limit = {"three-matter": gaps[panel.name].high / 0.05, "all-matter": gaps[panel.name].low / 0.25}
+        assert limit[panel.name] == pytest.approx(high - low, rel=1e-3)
 
 
 @pytest.mark.parametrize(("each", "panel"), EVERY, ids=lambda part: getattr(part, "name", ""))
