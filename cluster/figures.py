@@ -21,7 +21,7 @@ mpl.rcParams.update(
     {"axes.spines.top": False, "axes.spines.right": False, "font.size": 9, "svg.hashsalt": "svaedc"}
 )
 
-_STYLES = {
+STYLES = {
     "random": ("#8c8c8c", "o", ":"),
     "screened-random": ("#4d4d4d", "s", ":"),
     "botorch": ("#e69f00", "X", "--"),
@@ -35,15 +35,16 @@ _STYLES = {
     "svae-dc-sigmoid": ("#a6761d", "p", "-"),
     "svae-matern": ("#cc79a7", ">", "-."),
     "svae-dc-matern": ("#d55e00", "h", "-."),
-    "bbk-kl": ("#666633", "1", "-"),
-    "lkl": ("#b2a300", "2", "-"),
+    "bbk-kl": ("#666633", (4, 1, 0), "-"),
+    "lkl": ("#b2a300", (4, 1, 45), "-"),
     "se-acqf": ("#0072b2", "d", ":"),
     "matern-acqf": ("#56b4e9", "H", ":"),
-    "turbo": ("#661100", "x", "--"),
-    "saasbo": ("#332288", "+", "--"),
+    "turbo": ("#661100", (6, 1, 0), "--"),
+    "saasbo": ("#332288", (3, 1, 0), "--"),
 }
 """Colour (Okabe and Ito's, which colour-blind people can tell apart), marker and line of each method: dotted
-without a model of f, dashed on controllers, solid on latent paths; a variant shares its colour."""
+without a model of f, dashed on controllers, solid on latent paths; a variant shares its colour. Markers are
+drawn without edges, so all are filled ones; a tuple is a star of that many points, turned by degrees."""
 _OTHER_STYLE = ("#000000", "d", "-.")
 
 
@@ -94,7 +95,7 @@ def _draw_method(
     curves: Axes, final: Axes, place: int, name: str, method: MethodSummary, limits: tuple[float, float]
 ) -> None:
     """A curve with its shaded interval, and its end once more, where intervals do not cover each other."""
-    colour, marker, line = _STYLES.get(name, _OTHER_STYLE)
+    colour, marker, line = STYLES.get(name, _OTHER_STYLE)
     mean, low, high = (
         np.array([getattr(estimate, part) for estimate in method.best]) for part in ("mean", "low", "high")
     )

@@ -16,6 +16,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
+from matplotlib.markers import MarkerStyle
 
 from cluster import figures
 from cluster.compare import compare, usable
@@ -469,3 +470,9 @@ def test_the_figure_has_the_same_bytes_every_time_and_names_every_method(tmp_pat
     svg = drawn[0][1].read_text()
     assert all(f"<!-- {name} (n = 3) -->" in svg for name in names())
     assert "unfinished (n" not in svg
+
+
+def test_every_method_has_a_marker_of_its_own_that_shows_without_an_edge():
+    markers = [figures.STYLES[name][1] for name in figures.STYLES]
+    assert all(MarkerStyle(marker).is_filled() for marker in markers)
+    assert len(set(markers)) == len(markers)
