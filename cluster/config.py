@@ -87,8 +87,8 @@ class TrainSettings(Section):
     """Of each process, one CPU each; `all` shares the free CPUs among the processes, each on one machine."""
     updates: PositiveInt | Literal["preset"] = "preset"
     """Gradient updates of each stage; fewer train faster and worse."""
-    stride: PositiveInt = 5
-    """Every how many control steps the model sees one."""
+    stride: PositiveInt | Literal["preset"] = "preset"
+    """Every how many control steps the model sees one; 5 in the preset `compact`, 1 in `paper`."""
     time_limit_seconds: PositiveFloat = inf
     """Training stops after the epoch in which this passes."""
     cache_folder: UserPath = Path("~/.cache/svaedc").expanduser()
@@ -121,6 +121,10 @@ class TrainSettings(Section):
     """Updates between two measures on held-out episodes, an epoch here whatever the dataset's size."""
     patience: PositiveInt | Literal["preset"] = "preset"
     """Epochs without a better held-out loss after which a stage ends early."""
+
+    def stride_or(self, usual: int) -> int:
+        """The stride, which is the preset's usual one unless it is given."""
+        return usual if self.stride == "preset" else self.stride
 
     def changes(self) -> dict[str, str | float | int]:
         """What is changed of the preset, by name."""

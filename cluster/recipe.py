@@ -102,12 +102,10 @@ class Scale:
 
     Attributes:
         preset: of training.
-        stride: of training.
         episodes: by setup.
     """
 
     preset: str
-    stride: int
     episodes: Mapping[str, int]
 
 

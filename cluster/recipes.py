@@ -15,8 +15,8 @@ from svaedc.evidence import Gain, Like, MedianGap, Steadier, Successes
 _DATA = ("franka", "yumi", "daisy-27d", "daisy-11d")
 SCALES: Final[Mapping[str, Scale]] = MappingProxyType(
     {
-        "machine": Scale("compact", 5, dict(zip(_DATA, (50_000, 20_000, 10_000, 10_000), strict=True))),
-        "paper": Scale("paper", 1, dict.fromkeys(_DATA, 500_000)),
+        "machine": Scale("compact", dict(zip(_DATA, (50_000, 20_000, 10_000, 10_000), strict=True))),
+        "paper": Scale("paper", dict.fromkeys(_DATA, 500_000)),
     }
 )
 """`paper`: sections 6.1 and 7.1, on a cluster with GPUs. `machine`: an hour or two of two cores."""

@@ -10,7 +10,7 @@ from cluster.errors import UserError
 from cluster.recipe import NINE, Panel, Recipe, Scale
 from cluster.trained_model import trained_model
 from cluster.training_record import MEASURES
-from svaedc.presets import Sizes, preset
+from svaedc.presets import Sizes, preset, usual_stride
 from workers import setups
 from workers.dataset.folder import Dataset, open_dataset
 from workers.dataset.manifest import MANIFEST
@@ -63,10 +63,8 @@ class Reproduction:
         return latent not in self.trains or (self.models[latent] / MEASURES).exists()
 
     def training(self, settings: TrainSettings, latent: str) -> TrainSettings:
-        """The settings of training, with the scale's stride unless another one was set."""
-        stride = settings.stride if "stride" in settings.model_fields_set else self.scale.stride
-        size = {} if latent == NINE else {"latent": latent}
-        return settings.model_copy(update={"stride": stride, **size})
+        """The settings of training for a size of the latent path."""
+        return settings if latent == NINE else settings.model_copy(update={"latent": latent})
 
     def updates(self, settings: TrainSettings) -> int:
         """Gradient updates of one training."""
@@ -82,7 +80,8 @@ class Reproduction:
 
     def _sizes(self, settings: TrainSettings) -> Sizes:
         setup = setups.load(self.recipe.data)
-        return Sizes(setup.dimensions, len(setup.observation), setup.horizon // settings.stride)
+        stride = settings.stride_or(usual_stride(self.scale.preset))
+        return Sizes(setup.dimensions, len(setup.observation), setup.horizon // stride)
 
 
 def resolved(

@@ -15,6 +15,7 @@ from cluster.training_job import MODEL, STATE, TrainingJob, done, saved_state
 from cluster.training_record import judge, read_json, record, recorded, write_json
 from cluster.training_submission import placed, submit
 from svaedc import checkpoint
+from svaedc.presets import usual_stride
 from svaedc.training import require_settings
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
@@ -123,6 +124,7 @@ def _folder(model: Path) -> None:
 
 def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
     """What the training processes get."""
+    stride = settings.stride_or(usual_stride(preset))
     return TrainingJob(
         dataset=dataset.folder.resolve(),
         model=model.resolve(),
@@ -132,14 +134,14 @@ def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: Tra
             "setup": dataset.identity.setup,
             "dataset": dataset.fingerprint(),
             "preset": preset,
-            "stride": settings.stride,
+            "stride": stride,
             "seed": seed,
             "balance": settings.balance,
             "changes": settings.changes(),
         },
         preset=preset,
         updates=0 if settings.updates == "preset" else settings.updates,
-        stride=settings.stride,
+        stride=stride,
         seed=seed,
         time_limit=settings.time_limit_seconds,
         checkpoint_every=settings.checkpoint_every_epochs,

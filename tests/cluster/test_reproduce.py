@@ -134,10 +134,12 @@ def test_the_bill_is_the_sum_of_single_costs_and_shrinks_by_what_is_there(tmp_pa
     assert "in all" in said
 
 
-def test_the_scale_decides_the_stride_unless_a_setting_does(tmp_path):
+def test_the_scales_preset_decides_stride_and_updates_unless_a_setting_does(tmp_path):
     paper = replace(plan_of(TINY, tmp_path), scale=SCALES["paper"])
-    assert paper.training(TrainSettings(), "3x3").stride == 1
-    assert paper.training(TrainSettings(stride=4), "3x3").stride == 4
+    numbers = 4 * paper.episodes * 25  # bytes of one sample of all episodes: 25 channels of float32
+    assert paper.cache_size(TrainSettings()) == 500 * numbers
+    assert paper.cache_size(TrainSettings(stride=4)) == 125 * numbers
+    assert plan_of(TINY, tmp_path).cache_size(TrainSettings()) == 100 * numbers
     assert paper.training(TrainSettings(), "5x6").changes() == {"latent": "5x6"}
     assert paper.training(TrainSettings(), "3x3").changes() == {}
     assert paper.updates(TrainSettings()) == 100_000
