@@ -1,5 +1,6 @@
 """The way to the robot: its one actor found or made, waited for, and left again."""
 
+import gc
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -67,6 +68,7 @@ def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status
             return actor, _admitted(actor, options, plan, deadline, say)
         except ActorDiedError:
             # An earlier driver's actor on its way out: entering moves nothing, so it may be tried again.
+            del actor
             time.sleep(POLL_SECONDS)
         except BaseException:
             if is_new:
@@ -77,6 +79,7 @@ def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status
 
 def _obtained(options: dict[str, Any]) -> tuple[Any, bool]:
     """The robot's actor, and whether it is new: one that was there before is not for this command to end."""
+    gc.collect()  # a name means its dead actor for as long as a handle of that one lives in this process
     for _ in range(ENTRANCES):
         with suppress(ValueError):
             return ray.get_actor(options["name"], options["namespace"]), False
