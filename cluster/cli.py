@@ -1,5 +1,6 @@
 """The command line `svaedc`: the same on a laptop, against a cluster, and under `ray job submit`."""
 
+import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -52,8 +53,9 @@ def demo(
     from cluster.demo import demo as run_demo
 
     folder.mkdir(parents=True, exist_ok=True)
-    store = f"tracking.uri=sqlite:///{folder / 'mlflow.db'}"
-    settings = settings_of(config, [store, *(overrides or [])])
+    # Quoted, because a folder's name may mean something in YAML.
+    store = json.dumps(f"sqlite:///{folder / 'mlflow.db'}")
+    settings = settings_of(config, [f"tracking.uri={store}", *(overrides or [])])
     with services(settings, address) as (session, tracker):
         run_demo(folder, settings, session, tracker)
 
@@ -142,9 +144,9 @@ def train(
 def compare(
     setup: SetupName,
     out: Annotated[Path, typer.Option("--out", help="Folder of the results.", callback=durable)],
-    methods: Annotated[str, typer.Option("--methods", help="Names, separated by commas.")] = (
-        "random,screened-random,se,svae,svae-dc"
-    ),
+    methods: Annotated[
+        str, typer.Option("--methods", help="Names, separated by commas; see docs/methods.md.")
+    ] = ("random,screened-random,se,svae,svae-dc"),
     runs: Annotated[int, typer.Option("--runs", min=1, help="Seeds of each method.")] = 50,
     trials: Annotated[
         int, typer.Option("--trials", min=1, help="Suggested trials, after the random ones.")

@@ -88,6 +88,11 @@ def foretell(
     with tracker.run(f"plan {setup.name}", "plan", parameters) as run:
         tally = Tally(planned=_size(pilot))
         reports = work(dataset, pilot, episodes, tally, run, rollout_pool(dataset, settings, actors))
+        if len(reports) < 2:
+            raise UserError(
+                f"{len(pilot) - len(reports)} of {len(pilot)} shards kept failing, so there is no plan; "
+                f"their errors are in {dataset.folder / FOLDER}, and the same command tries them again"
+            )
         expected = forecast(reports, _size(plan), actors)
         begin(dataset, episodes, expected, tally)
         say(described(expected, _size(pilot)))

@@ -11,6 +11,7 @@ from cluster.comparison_report import FIGURE, PAGE, SUMMARY, lines, publish, sum
 from cluster.comparison_runs import Standing, Watch, submit
 from cluster.comparison_tracking import Note, TrackedComparison, begin, note_in
 from cluster.config import CompareSettings
+from cluster.errors import UserError
 from cluster.grid import Grid
 from cluster.options import usage_errors
 from cluster.progress import ProgressLine, say
@@ -66,6 +67,23 @@ class _Plan:
         """The runs asked for that are not whole."""
         return [key for key in self.grid.keys() if len(runs.get(key, ())) < self.job.length]  # noqa: SIM118
 
+    def require_length(self, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
+        """Refuse runs that would never be compared, and name those that no longer will: the longest are.
+
+        Raises:
+            UserError: other runs have more trials.
+        """
+        folder, longest = self.job.folder, max(map(len, runs.values()), default=0)
+        suggested = longest - self.job.initial
+        if self.missing(runs) and longest > self.job.length:
+            raise UserError(
+                f"{folder} holds runs of {suggested} suggested trials, and only the longest are compared: "
+                f"ask for --trials {suggested}, or choose another folder with --out"
+            )
+        others = {key.method for key in runs.keys() - self.grid.keys() if len(runs[key]) < self.job.length}
+        if others:
+            say(f"runs of {', '.join(sorted(others))} in {folder} have fewer trials: they are not compared")
+
 
 def compare(
     *,
@@ -106,6 +124,7 @@ def compare(
         grid.require_purpose(folder, seeds_in(folder))
         parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
         note = note_in(folder, tracker)
+        plan.require_length(dict(all_runs(folder)))
         if _is_finished(plan, note):
             say(f"{folder} holds the whole comparison: nothing to do")
             return Comparison(summary_of(plan.job, list(all_runs(folder))), Run(tracker, note.run).url)

@@ -64,18 +64,22 @@ class TrackedComparison:
     def __init__(self, folder: Path, note: Note, run: Run) -> None:
         self._folder = folder
         self._note = note
-        self._silent = True
+        self._failed = False
         self.run = run
         self._save()
 
     def try_child(self, key: RunKey, trials: list[Trial]) -> None:
-        """Record a run that has just ended; a store that fails meanwhile stops no comparison."""
+        """Record a run that has just ended; a store that fails stops no comparison.
+
+        It is then left alone until the end: MLflow tries a server that is away for minutes each time.
+        """
+        if self._failed:
+            return
         try:
             self.child(key, trials)
         except UserError as error:
-            if self._silent:
-                say(f"{error}. The comparison goes on; what MLflow lacks is recorded at its end")
-            self._silent = False
+            self._failed = True
+            say(f"{error}. The comparison goes on; what MLflow lacks is recorded at its end")
 
     def child(self, key: RunKey, trials: list[Trial]) -> None:
         """Record a run, unless MLflow has it.

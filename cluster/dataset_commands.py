@@ -13,6 +13,7 @@ from cluster.errors import UserError
 from cluster.options import dataset_location, durable, interruptible
 from cluster.progress import ProgressLine
 from cluster.quarantine import quarantined
+from cluster.termination import terminating_as_exit
 from workers.dataset.folder import Dataset, open_dataset
 from workers.dataset.identity import Identity
 from workers.dataset.inventory import inventory
@@ -111,7 +112,7 @@ def verify_command(
     dataset = _opened(folder)
     found = [*inventory(dataset), *_problems_in_files(dataset)]
     if rederive:
-        with interruptible():
+        with interruptible("nothing was changed"), terminating_as_exit():
             found += recomputed(dataset, rederive)
     uncollected = list(gaps(dataset))
     for problem in found:
@@ -144,7 +145,7 @@ def _problems_in_files(dataset: Dataset) -> list[Problem]:
 def repair_command(folder: Folder) -> None:
     """Roll out broken and lost shards again and put them in place; keeps what it replaces."""
     dataset = _opened(folder)
-    with interruptible():
+    with interruptible(), terminating_as_exit():
         repair_dataset(dataset)
     left = [*inventory(dataset), *overlaps(dataset)]
     for problem in left:
@@ -164,6 +165,6 @@ def export_command(
 ) -> None:
     """Write the episodes in another format, one shard in memory at a time."""
     dataset = _opened(folder)
-    with interruptible():
+    with interruptible("nothing of it is kept, and the same command begins anew"), terminating_as_exit():
         export(dataset, form, out)
     typer.echo(f"{out} holds {dataset.episodes()} episodes")

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Iterator, Mapping
+from glob import escape
 from pathlib import Path
 
 from cluster.errors import UsageError, UserError, nearest
@@ -9,7 +10,7 @@ from cluster.progress import ProgressLine
 from workers.dataset.folder import Dataset
 from workers.dataset.lerobot_export import export_lerobot
 from workers.dataset.numpy_export import export_npz
-from workers.dataset.publication import writer
+from workers.dataset.publication import is_dead, writer
 from workers.dataset.shards import Shard
 
 FORMATS: Mapping[str, Callable[[Dataset, Path], Iterator[Shard]]] = {
@@ -31,6 +32,7 @@ def export(dataset: Dataset, form: str, out: Path) -> None:
         raise UserError(f"{out} exists already; choose a new folder, an export never writes into one")
     if not dataset.episodes():
         raise UserError(f"{dataset.folder} holds no episodes yet; collect some first")
+    _sweep(out)
     building = out.with_name(f"{out.name}.{writer()}")
     building.mkdir(parents=True)
     try:
@@ -44,3 +46,10 @@ def export(dataset: Dataset, form: str, out: Path) -> None:
         ) from error
     finally:
         shutil.rmtree(building, ignore_errors=True)
+
+
+def _sweep(out: Path) -> None:
+    """Remove what exports to the same place left behind that were killed."""
+    for path in out.parent.glob(f"{escape(out.name)}.*"):
+        if is_dead(path.name.removeprefix(f"{out.name}.")):
+            shutil.rmtree(path, ignore_errors=True)

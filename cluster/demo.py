@@ -85,13 +85,15 @@ def demo(
 
 
 def _train(folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize) -> None:
+    usual = {"updates": size.updates, "cache_folder": folder / "cache"}
+    given = settings.train.model_fields_set
     train(
         folder=folder / "dataset",
         model=folder / "model",
         preset="compact",
         seed=0,
         settings=settings.train.model_copy(
-            update={"updates": size.updates, "cache_folder": folder / "cache"}
+            update={name: value for name, value in usual.items() if name not in given}
         ),
         session=session,
         tracker=tracker,

@@ -21,6 +21,8 @@ from workers.tasks.own_bad import with_bad
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
+KEPT = "everything finished is kept, and the same command goes on from here"
+"""What stopping means for nearly all commands."""
 
 
 def durable(path: Path | None) -> Path | None:
@@ -93,12 +95,13 @@ Address = Annotated[
     typer.Option(
         "--address",
         metavar="HOST:PORT",
-        help="A running Ray cluster; without it, one is started here for this command.",
+        help="A running Ray cluster that this machine belongs to, or auto; without it that of RAY_ADDRESS, "
+        "and without that one is started here for this command.",
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
 SetupName = Annotated[
-    str, typer.Option("--setup", help="Robot, controller and task, such as franka, or a module of your own.")
+    str, typer.Option("--setup", help=f"{', '.join(setups.MODULES)}, or a module of your own.")
 ]
 DatasetFolder = Annotated[
     Any,  # a Location, which typer does not know
@@ -143,12 +146,16 @@ def working(setup: Setup, seed: int) -> Setup:
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
-    """Ends a long command that was asked to stop with one sentence and the usual exit code."""
+def interruptible(consequence: str = KEPT) -> Iterator[None]:
+    """Ends a long command that was asked to stop with one sentence and the usual exit code.
+
+    Args:
+        consequence: what that means, the rest of the sentence.
+    """
     try:
         yield
     except (KeyboardInterrupt, SystemExit) as stop:
-        say("stopped: everything finished is kept, and the same command goes on from here")
+        say(f"stopped: {consequence}")
         raise SystemExit(stop.code if isinstance(stop, SystemExit) else INTERRUPTED) from None
 
 

@@ -8,7 +8,7 @@ from cluster.grid import Grid
 from cluster.placement import free_machines
 from cluster.progress import say, timed
 from cluster.recipe import Panel
-from cluster.reproduction import Reproduction, cores
+from cluster.reproduction import Reproduction
 from cluster.reproduction_report import Table, publish, table
 from cluster.session import Session
 from cluster.tracking import Tracker
@@ -18,11 +18,6 @@ from svaedc.summaries import Summary
 from workers import setups
 
 
-def foretell(reproduction: Reproduction, settings: Settings) -> None:
-    """Say what a reproduction will cost, and start nothing."""
-    _say_bill(reproduction, settings, cores(settings))
-
-
 def reproduce(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> Table:
     """Do what is missing of a reproduction; the same call goes on after an interruption.
 
@@ -30,7 +25,7 @@ def reproduce(reproduction: Reproduction, settings: Settings, session: Session, 
         UserError: as `collect`, `train` and `compare` do; the cluster is checked for all of them first.
     """
     _preflight(reproduction, settings, session)
-    _say_bill(reproduction, settings, session.cpus)
+    foretell(reproduction, settings, session.cpus)
     _collect(reproduction, settings, session, tracker)
     for latent in reproduction.trains:
         _train(reproduction, latent, settings, session, tracker)
@@ -46,7 +41,8 @@ def reproduce(reproduction: Reproduction, settings: Settings, session: Session, 
     return found
 
 
-def _say_bill(reproduction: Reproduction, settings: Settings, count: int) -> None:
+def foretell(reproduction: Reproduction, settings: Settings, count: int) -> None:
+    """Say what is still to do of a reproduction, and what that costs on so many cores; starts nothing."""
     recipe = reproduction.recipe
     say(f"{recipe.figure}: {recipe.label}, {reproduction.runs} runs of each method, in {reproduction.folder}")
     for line in lines(reproduction, bill(reproduction, settings, count), count):

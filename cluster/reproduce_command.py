@@ -1,15 +1,16 @@
 """`svaedc reproduce`: a figure of the paper, from data to picture."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from cluster.options import Address, Config, Overrides, durable, settings_of, usage_errors
+from cluster.errors import UsageError
+from cluster.options import Address, Config, Overrides, durable, durable_dataset, settings_of, usage_errors
 from cluster.services import services
 
 _SCALE_HELP = (
-    "machine: the data that two cores collect in hours; paper: 500,000 episodes and its own training."
+    "machine: what two cores collect in up to an hour; paper: 500,000 episodes and its own training."
 )
 
 
@@ -25,7 +26,10 @@ Runs = Annotated[
     int | None, typer.Option("--runs", min=1, max=1000, help="Of each method, instead of the paper's.")
 ]
 Given = Annotated[
-    Path | None, typer.Option("--dataset", help="Collected already; used as it is.", callback=durable)
+    Any,  # a Location, which typer does not know
+    typer.Option(
+        "--dataset", metavar="PLACE", help="Collected already; used as it is.", parser=durable_dataset
+    ),
 ]
 Models = Annotated[
     list[Path] | None,
@@ -59,9 +63,14 @@ def reproduce(
     from cluster import recipes
     from cluster.reproduce import foretell
     from cluster.reproduce import reproduce as run_reproduction
-    from cluster.reproduction import resolved
+    from cluster.reproduction import cores, resolved
+    from cluster.session import connect
 
     settings = settings_of(config, overrides)
+    if settings.train.latent != "preset":
+        raise UsageError("a figure's panels decide the size of the latent path: leave train.latent out")
+    if dataset is not None and episodes is not None:
+        raise UsageError("--episodes says how many to collect, --dataset is collected already: leave one out")
     with usage_errors():
         recipe, size = recipes.recipe(figure), recipes.scale(scale)
     reproduction = resolved(
@@ -73,8 +82,12 @@ def reproduce(
         dataset=dataset,
         models=tuple(path.expanduser().absolute() for path in model or ()),
     )
+    if plan and not address:
+        foretell(reproduction, settings, cores(settings))
+        return
     if plan:
-        foretell(reproduction, settings)
+        with connect(settings.ray, address) as session:
+            foretell(reproduction, settings, session.cpus)
         return
     with services(settings, address) as (session, tracker):
         run_reproduction(reproduction, settings, session, tracker)

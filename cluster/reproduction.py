@@ -13,6 +13,7 @@ from cluster.training_record import MEASURES
 from svaedc.presets import Sizes, preset, usual_stride
 from workers import setups
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.location import Location
 from workers.dataset.manifest import MANIFEST
 
 
@@ -37,7 +38,7 @@ class Reproduction:
     folder: Path
     episodes: int
     runs: int
-    dataset: Path
+    dataset: Location
     collects: bool
     models: Mapping[str, Path]
     trains: tuple[str, ...]
@@ -55,7 +56,8 @@ class Reproduction:
         """Still to be collected."""
         if not self.collects:
             return 0
-        done = open_dataset(self.dataset).episodes() if (self.dataset / MANIFEST).exists() else 0
+        begun = (self.dataset / MANIFEST).exists()
+        done = _opened(self.dataset, self.recipe.data).episodes() if begun else 0
         return max(0, self.episodes - done)
 
     def is_trained(self, latent: str) -> bool:
@@ -91,7 +93,7 @@ def resolved(
     *,
     episodes: int,
     runs: int,
-    dataset: Path | None,
+    dataset: Location | None,
     models: tuple[Path, ...],
 ) -> Reproduction:
     """A reproduction with every open choice made.
@@ -133,7 +135,7 @@ def cores(settings: Settings) -> int:
     return len(os.sched_getaffinity(0)) if wanted == "all" else wanted
 
 
-def _opened(folder: Path, setup: str) -> Dataset:
+def _opened(folder: Location, setup: str) -> Dataset:
     try:
         dataset = open_dataset(folder)
     except (ValueError, OSError) as error:

@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, takewhile
@@ -20,6 +21,7 @@ from svaedc.summaries import Row
 
 RUNS = "runs"
 TABLE = "trials.parquet"
+_NAME = re.compile(r"(?P<method>.+)-(?P<run>\d{5,})\.jsonl")
 
 
 @dataclass(frozen=True, order=True)
@@ -91,14 +93,21 @@ def _trial(line: dict[str, Any]) -> Trial:
 
 def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
     """Every run of a comparison that has begun, in order."""
-    for path in sorted((folder / RUNS).glob("*.jsonl")):
-        method, _, run = path.stem.rpartition("-")
-        yield RunKey(method, int(run)), recorded(path)
+    for key in sorted(_begun(folder)):
+        yield key, recorded(key.path(folder))
 
 
 def seeds_in(folder: Path) -> set[int]:
     """Of all runs that have begun."""
-    return {int(path.stem.rpartition("-")[2]) for path in (folder / RUNS).glob("*.jsonl")}
+    return {key.run for key in _begun(folder)}
+
+
+def _begun(folder: Path) -> Iterator[RunKey]:
+    """Of files that are no run's, such as copies, nothing is said."""
+    for path in (folder / RUNS).glob("*.jsonl"):
+        match = _NAME.fullmatch(path.name)
+        if match:
+            yield RunKey(match["method"], int(match["run"]))
 
 
 def rows(runs: Runs) -> list[Row]:

@@ -5,7 +5,7 @@ from workers.collection import ShardReport, collect_shard, require_same_code, re
 from workers.dataset.folder import open_dataset
 from workers.dataset.location import location
 from workers.dataset.publication import writer
-from workers.dataset.shards import Shard
+from workers.dataset.shards import Shard, sweep
 from workers.tasks.own_bad import with_bad
 
 
@@ -17,6 +17,7 @@ class RolloutActor:
         self._setup = with_bad(setups.load(setup), self._dataset.identity.bad_name)
         require_same_code(self._setup, self._dataset)
         require_working(self._setup, self._dataset.identity.seed)
+        sweep(self._dataset.folder)  # what processes of this machine left, which no other can tell dead
 
     def ready(self) -> str:
         """The name under which this process writes files, once it has started and found its dataset."""

@@ -156,8 +156,9 @@ def _join(settings: RaySettings, wanted: str) -> None:
     except (RpcError, ConnectionError, RuntimeError, RaySystemError) as error:
         reason = str(error).partition("\n")[0]
         raise UserError(
-            f"the Ray cluster at {address} cannot be joined: {reason}; it must run Ray {ray.__version__} "
-            f"and Python {sys.version_info.major}.{sys.version_info.minor}"
+            f"the Ray cluster at {address} cannot be joined: {reason}; this machine must be part of it (from "
+            f"any other, use `ray job submit`), and it must run Ray {ray.__version__} and Python "
+            f"{sys.version_info.major}.{sys.version_info.minor}"
         ) from error
 
 

@@ -6,8 +6,8 @@ from typing import Final, Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Float
+from scipy.linalg import hadamard
 from torch import Tensor
-from torch.quasirandom import SobolEngine
 
 from svaedc import divergences
 from svaedc.architecture import ModelConfig
@@ -16,9 +16,6 @@ from svaedc.distributions import Diagonal
 Divergence = Callable[[Tensor, Tensor], Tensor]
 """KL(p_i || q_j) of all pairs of rows [location | log scale]."""
 
-PAIRS: Final = 8
-"""Antithetic pairs of latent paths that the moments of p(xi|x) come from; always the same ones, because fresh
-ones would make k(x, x) differ from 1."""
 STEPS: Final = 10
 """Evenly spaced steps of a trajectory that BBK-KL compares: neighbouring ones repeat each other, and alpha
 absorbs the common factor that D loses."""
@@ -92,19 +89,29 @@ def trajectory_rows(model: Generative, x: Float[Tensor, "n D"]) -> Float[Tensor,
     r"""The moments of p(xi|x) = \int p(xi|tau) p(tau|x) d tau as [mean | log standard deviation].
 
     E[xi] is the mean of the decoded locations, Var[xi] = E[Var[xi|tau]] + Var[E[xi|tau]], over latent paths
-    at fixed antithetic quantiles of p(tau|x).
+    that have the mean and the covariance of p(tau|x), so both are exact for a linear decoder. They are always
+    the same ones, because fresh ones would make k(x, x) differ from 1.
     """
     return torch.cat([_moments(model, block) for block in x.float().split(BLOCK)])
 
 
 def _moments(model: Generative, x: Float[Tensor, "n D"]) -> Float[Tensor, "n rows"]:
     q = model.prior(x)
-    u = SobolEngine(q.loc.shape[1], scramble=True, seed=0).draw(PAIRS)
-    decoded = [model.p_xi(model.split(q.quantile(each))[0]) for each in torch.cat([u, 1 - u])]
+    (mean, _), (spread, _) = model.split(q.loc), model.split(q.variance.sqrt())
+    decoded = [model.p_xi(mean + spread * corner) for corner in _corners(mean.shape[1]).to(mean)]
     loc = torch.stack([_thinned(each.loc) for each in decoded])
     variance = torch.stack([_thinned(each.variance) for each in decoded])
     total = variance.mean(dim=0) + loc.var(dim=0, correction=0)
     return torch.cat([loc.mean(dim=0), 0.5 * total.clamp_min(_LEAST_VARIANCE).log()], dim=-1)
+
+
+def _corners(dimensions: int) -> Float[Tensor, "points dimensions"]:
+    """Corners of a cube, each with its opposite, whose mean is 0 and whose covariance is 1.
+
+    Columns of a Hadamard matrix are orthogonal to each other and, but for the first, to the constant.
+    """
+    signs = torch.tensor(hadamard(1 << dimensions.bit_length())[:, 1 : dimensions + 1])
+    return torch.cat([signs, -signs]).float()
 
 
 def _thinned(xi: Float[Tensor, "n obs time"]) -> Float[Tensor, "n elements"]:

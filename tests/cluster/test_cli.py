@@ -74,6 +74,12 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
         (("collect",), 2, "Missing option"),
         # That nothing answers there would be found out first, if Ray were started before the refusal.
         ((*COMPARE, "--methods", ","), 2, "--methods must name at least one of bbk-kl, botorch"),
+        (
+            ("reproduce", "figure-9", "--dataset", "data", "--episodes", "300", "--plan"),
+            2,
+            "--dataset is collected already: leave one out",
+        ),
+        (("reproduce", "figure-9", "--set", "train.latent=15x12"), 2, "leave train.latent out"),
         ((*COMPARE, "--methods", "se,svae"), 2, "svae need a trained model: name its folder with --model"),
     ],
 )

@@ -23,10 +23,11 @@ from cluster.compare import compare, usable
 from cluster.comparison_folder import alone_in
 from cluster.comparison_job import evaluation
 from cluster.comparison_runs import Standing
+from cluster.comparison_tracking import begin
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
 from cluster.grid import Grid
-from cluster.results import RunKey, append, recorded
+from cluster.results import RunKey, all_runs, append, recorded, seeds_in
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
 from svaedc.comparison import Trial
@@ -427,6 +428,40 @@ def test_a_store_that_fails_meanwhile_costs_no_run_and_is_caught_up_with(compare
     parents, children = mlflow_runs(tracking_settings)
     assert sorted(run.info.run_name for run in children) == ["random 1000", "random 1001", "random 1002"]
     assert {run.info.status for run in parents + children} == {"FINISHED"}
+
+
+def test_a_store_that_failed_once_is_left_alone_until_the_end(tmp_path, capsys):
+    # One whose server accepts and stays silent would cost minutes for every run.
+    store = TrackingSettings(uri=f"sqlite:///{tmp_path / 'mlflow.db'}", experiment="tests")
+    (tmp_path / "out").mkdir()
+    tracked = begin(tmp_path / "out", open_tracker(store), "compare", {})
+    (tmp_path / "mlflow.db").unlink()
+    (tmp_path / "mlflow.db").mkdir()
+    with tracked.run:
+        for seed in (1000, 1001):
+            tracked.try_child(RunKey("random", seed), [trial(0)])
+        with pytest.raises(UserError, match="cannot be used"):
+            tracked.child(RunKey("random", 1000), [trial(0)])
+    assert capsys.readouterr().err.count("The comparison goes on") == 1
+
+
+def test_runs_that_would_vanish_beside_longer_ones_are_refused(compared, capsys):
+    out = compared("random", runs=1)
+    whole = table(out)
+    with pytest.raises(UserError, match=r"holds runs of 2 suggested trials.*ask for --trials 2"):
+        compared("se", runs=1, trials=1)
+    assert table(out) == whole
+    capsys.readouterr()
+    compared("se", runs=1, trials=3)
+    assert "runs of random in" in capsys.readouterr().err
+
+
+def test_a_copy_among_the_records_is_no_run(tmp_path):
+    (tmp_path / "runs").mkdir()
+    append(RunKey("svae-dc", 3).path(tmp_path), trial(0))
+    shutil.copy(RunKey("svae-dc", 3).path(tmp_path), tmp_path / "runs" / "svae-dc-00003 (copy).jsonl")
+    assert [key for key, _ in all_runs(tmp_path)] == [RunKey("svae-dc", 3)]
+    assert seeds_in(tmp_path) == {3}
 
 
 @pytest.mark.slow

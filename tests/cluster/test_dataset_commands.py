@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from workers import setups
 from workers.collection import collect_shard
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
+from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
 
 
@@ -84,6 +87,17 @@ def test_an_export_of_a_damaged_dataset_leaves_nothing(dataset, tmp_path):
     with pytest.raises(UserError, match="lists everything that is wrong"):
         run("export", str(dataset.folder), "--format", "npz", "--out", str(out))
     assert list(out.parent.iterdir()) == []
+
+
+def test_an_export_removes_what_a_killed_one_left_and_nothing_else(dataset, tmp_path):
+    script = "import sys; from workers.dataset.publication import writer; print(writer())"
+    dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    others = ["npz.backup", f"lerobot.{dead.stdout.strip()}", f"npz.{writer()}-2"]
+    for name in (f"npz.{dead.stdout.strip()}", *others):
+        (tmp_path / "exports" / name).mkdir(parents=True)
+    out = tmp_path / "exports" / "npz"
+    run("export", str(dataset.folder), "--format", "npz", "--out", str(out))
+    assert {path.name for path in out.parent.iterdir()} == {"npz", *others}
 
 
 def test_an_unknown_format_is_refused_with_the_nearest(dataset, tmp_path):

@@ -116,6 +116,14 @@ def test_a_given_dataset_is_used_as_it_is(tmp_path, few_episodes):
     assert given.missing_episodes() == 0
 
 
+def test_a_damaged_dataset_in_the_way_is_refused_before_its_bill(tmp_path):
+    push = plan_of(TINY, tmp_path)
+    push.dataset.mkdir(parents=True)
+    (push.dataset / "dataset.json").write_text("{")
+    with pytest.raises(UserError, match="cannot use the dataset"):
+        costs(push)
+
+
 def test_the_bill_is_the_sum_of_single_costs_and_shrinks_by_what_is_there(tmp_path, few_episodes):
     whole = plan_of(TINY, tmp_path)
     items = costs(whole)

@@ -24,8 +24,14 @@ def test_latent_rows_are_the_models_own_distribution(frozen, x):
     torch.testing.assert_close(log_scale, q.scale[:, :k].log().double())
 
 
-def test_trajectory_rows_are_the_moments_of_trajectories_drawn_from_the_model(frozen, x, monkeypatch):
-    monkeypatch.setattr(densities, "PAIRS", 256)
+@pytest.mark.parametrize("dimensions", [1, 3, 9, 16, 30])
+def test_the_latent_paths_behind_the_moments_have_mean_0_and_covariance_1(dimensions):
+    corners = densities._corners(dimensions).double()
+    assert corners.mean(dim=0).tolist() == [0.0] * dimensions
+    torch.testing.assert_close(corners.T.cov(correction=0), torch.eye(dimensions).double().squeeze())
+
+
+def test_trajectory_rows_are_the_moments_of_trajectories_drawn_from_the_model(frozen, x):
     mean, log_deviation = densities.trajectory_rows(frozen, x[:2]).chunk(2, dim=1)
     torch.manual_seed(0)
     q = frozen.prior(x[:2].repeat(4_000, 1))
