@@ -44,8 +44,8 @@ class RaySettings(Section):
     """Sockets and logs; short, because a socket's whole path may have 107 characters."""
     log_file_bytes: int = Field(default=20_000_000, ge=100_000)
     """Bytes after which a process of Ray begins its log anew; the full one before it is kept."""
-    connect_timeout_seconds: PositiveFloat = 5.0
-    """How long a running cluster has to accept a connection."""
+    connect_timeout_seconds: float = Field(default=5.0, gt=0.0, le=3600.0)
+    """How long a running cluster has to accept a connection; at most an hour."""
 
 
 class CollectSettings(Section):

@@ -1,4 +1,4 @@
-"""Machines of the connected cluster: whether one is still there, and what all have free."""
+"""Machines of the connected cluster: whether one is still there, what all have free, and who has a place."""
 
 import socket
 from typing import Any
@@ -20,6 +20,11 @@ def machine_of(actor: Any) -> str:
     """The id of the machine on which an actor runs; "" if the actor is lost already."""
     known = actors(actor._actor_id.hex()) or {}
     return str(known.get("Address", {}).get("NodeID", ""))
+
+
+def has_a_place(actor: Any) -> bool:
+    """Whether an actor runs on some machine; otherwise it waits for what it requires, or is lost."""
+    return (actors(actor._actor_id.hex()) or {}).get("State") == "ALIVE"
 
 
 def is_there(machine: str) -> bool:

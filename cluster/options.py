@@ -37,7 +37,8 @@ def durable(path: Path | None) -> Path | None:
     if not path.is_absolute() and "working_dir_files" in Path.cwd().parts:
         raise UsageError(
             f"{path} would be deleted with the job's copy of the working directory; "
-            "give an absolute path that every machine of the cluster sees"
+            "give an absolute path that every machine of the cluster sees, or, for a campaign on hardware, "
+            "one on a local disk of the robot's machine"
         )
     return path.expanduser().absolute()
 

@@ -11,8 +11,9 @@ from cluster.config import HardwareSettings
 from cluster.hardware import operator
 from cluster.hardware.identity import Approval
 from cluster.hardware.status import Status
-from cluster.options import Address, Config, Overrides, Seed, TrainedModel, interruptible, settings_of
+from cluster.options import Address, Config, Overrides, Seed, TrainedModel, durable, settings_of
 from cluster.progress import say
+from cluster.services import services
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -21,7 +22,8 @@ app = typer.Typer(
 )
 
 Folder = Annotated[
-    Path, typer.Argument(help="Folder of the campaign, on a local disk of the robot's machine.")
+    Path,
+    typer.Argument(help="Folder of the campaign, on a local disk of the robot's machine.", callback=durable),
 ]
 TrialNumber = Annotated[int, typer.Option("--trial", min=0, help="Its number, as `status` shows it.")]
 Who = Annotated[str, typer.Option("--who", help="Your name; kept in the journal.")]
@@ -53,8 +55,6 @@ def start(
     """Carry a campaign out, or go on with it: 2 random trials, then suggested ones."""
     from cluster.hardware.driver import start as run_start
     from cluster.hardware.plan import Plan, identify
-    from cluster.session import connect
-    from cluster.tracking import open_tracker
     from svaedc.checkpoint import located
 
     settings = settings_of(config, overrides)
@@ -65,8 +65,7 @@ def start(
         checkpoint,
         pace,
     )
-    tracker = open_tracker(settings.tracking)
-    with interruptible(), connect(settings.ray, address) as session:
+    with services(settings, address) as (session, tracker):
         last = run_start(settings.hardware, session, tracker, plan, _report, say)
     _show(last)
 

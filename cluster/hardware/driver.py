@@ -8,67 +8,23 @@ from math import inf
 from typing import Any
 
 import ray
-from ray.exceptions import ActorDiedError, RayActorError, RayTaskError
+from ray.exceptions import RayActorError, RayTaskError
 
 from cluster.config import HardwareSettings
 from cluster.errors import UserError
 from cluster.hardware import journal, operator
+from cluster.hardware.actor import actor_options
+from cluster.hardware.entrance import LEAVE_SECONDS, POLL_SECONDS, Say, at_the_robot, require_robot_host
 from cluster.hardware.plan import Plan
 from cluster.hardware.standing import Standing
 from cluster.hardware.states import State
-from cluster.hardware.station import RobotTaken, Station
 from cluster.hardware.status import Status
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
 
-RESOURCE = "hardware"
-POLL_SECONDS = 0.5
-ENTRANCES = 10
-LEAVE_SECONDS = 5.0
 BROKEN = frozenset({State.FAILED, State.REJECTED})
 
 Report = Callable[[Status], None]
-Say = Callable[[str], None]
-
-
-class HardwareActor:
-    """The Ray side of a `Station`; it decides nothing."""
-
-    def __init__(self) -> None:
-        self._station = Station()
-
-    def enter(self, plan: Plan) -> Status:
-        """See `Station.enter`."""
-        return self._station.enter(plan)
-
-    def advance(self, plan: Plan) -> Status:
-        """See `Station.advance`."""
-        return self._station.advance(plan)
-
-    def leave(self) -> None:
-        """See `Station.leave`."""
-        return self._station.leave()
-
-
-def actor_options(robot: str, namespace: str, lifetime: str) -> dict[str, Any]:
-    """How the one actor of a robot must run: nothing Ray does may start a trial a second time.
-
-    Args:
-        robot: in the registry.
-        namespace: that everybody who shares the robot uses.
-        lifetime: "detached" where the cluster outlives the driver, so that a trial outlives it too.
-    """
-    return {
-        "name": f"hardware-{robot}",
-        "namespace": namespace,
-        "get_if_exists": True,
-        "lifetime": lifetime,
-        "num_cpus": 0,
-        "resources": {RESOURCE: 1},
-        "max_concurrency": 1,
-        "max_restarts": 0,
-        "max_task_retries": 0,
-    }
 
 
 def start(
@@ -87,51 +43,13 @@ def start(
     Raises:
         UserError: when the campaign cannot go on without a person; the message says what they must do.
     """
-    _require_robot_host()
+    require_robot_host()
     lifetime = "non_detached" if session.is_local else "detached"
     options = actor_options(plan.identity.robot, settings.namespace, lifetime)
-    with _explained(plan), _at_the_robot(options, plan) as (actor, first):
+    with _explained(plan), at_the_robot(options, plan, say) as (actor, first):
         parameters = {**asdict(plan.identity), "folder": str(plan.folder)}
         with tracker.run(first.name, "hardware", parameters, {"svaedc.campaign": first.name}) as run:
             return _carry_out(actor, plan, first, run, report, say)
-
-
-def _require_robot_host() -> None:
-    if ray.cluster_resources().get(RESOURCE, 0.0) < 1.0:
-        raise UserError(
-            f"no machine of the Ray cluster offers the resource {RESOURCE!r}; start the robot's machine "
-            f"with: ray start --resources '{{\"{RESOURCE}\": 1}}'"
-        )
-
-
-@contextmanager
-def _at_the_robot(options: dict[str, Any], plan: Plan) -> Iterator[tuple[Any, Status]]:
-    """The actor with the plan entered; it ends after its present trial, whatever happens to the driver."""
-    actor, first = _entered(options, plan)
-    try:
-        yield actor, first
-    finally:
-        left = actor.leave.remote()
-        actor.__ray_terminate__.remote()
-        ray.wait([left], timeout=LEAVE_SECONDS)
-
-
-def _entered(options: dict[str, Any], plan: Plan) -> tuple[Any, Status]:
-    for _ in range(ENTRANCES):
-        actor: Any = ray.remote(HardwareActor).options(**options).remote()
-        try:
-            return actor, ray.get(actor.enter.remote(plan))
-        except ActorDiedError:
-            # An earlier driver's actor on its way out: entering moves nothing, so it may be tried again.
-            time.sleep(POLL_SECONDS)
-        except RobotTaken:
-            raise
-        except UserError:
-            actor.__ray_terminate__.remote()
-            raise
-    raise UserError(
-        f"the actor {options['name']} dies whenever it starts; look into the Ray logs of the robot's machine"
-    )
 
 
 def _carry_out(actor: Any, plan: Plan, first: Status, run: Run, report: Report, say: Say) -> Status:

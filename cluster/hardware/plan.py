@@ -8,6 +8,7 @@ from cluster.hardware.identity import Approval, Identity
 from cluster.hardware.proposals import fingerprint
 from svaedc import methods
 from workers.hardware import robots
+from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Plan:
         identity: of the campaign.
         folder: of its journal and ledger, on a local disk of the robot's machine; kept absolute.
         model: checkpoint, kept absolute; None for a method without one.
-        pace: least duration of a trial on a rehearsal robot, in s.
+        pace: least duration of a trial on a rehearsal robot, in s, at most a day.
     """
 
     identity: Identity
@@ -27,8 +28,8 @@ class Plan:
     pace: float
 
     def __post_init__(self) -> None:
-        if self.pace < 0.0:
-            raise UsageError(f"pace must be at least 0 s, got {self.pace}")
+        if not 0.0 <= self.pace <= LONGEST_PACE_SECONDS:
+            raise UsageError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {self.pace}")
         # The process that carries it out has a working directory of its own.
         object.__setattr__(self, "folder", self.folder.absolute())
         object.__setattr__(self, "model", self.model and self.model.absolute())

@@ -54,6 +54,13 @@ class Station:
         finally:
             self._asked = monotonic()
 
+    def withdraw(self, plan: Plan) -> bool:
+        """Gives the place up unless another campaign has it; whether the place is empty then."""
+        if self._executor is not None and not _is_same(self._executor.plan, plan):
+            return False
+        self.leave()
+        return True
+
     def leave(self) -> None:
         """Gives the place up."""
         if self._executor is not None:

@@ -72,7 +72,8 @@ def _advice(journal: Journal, trials: tuple[Trial, ...], now: Standing, executor
     if now is Standing.AWAITS_APPROVAL:
         return f"trial {number} waits: svaedc hardware approve {folder} --trial {number} --who NAME"
     if trials and trials[-1].state in REASONS:
-        return f"trial {trials[-1].number} was {_reason(journal)}; see to it, then repeat the start command"
+        last = trials[-1].number
+        return f"trial {last} was {_reason(journal, last)}; see to it, then repeat the start command"
     if executor is not None:
         return f"executed by {executor}"
     if now is Standing.RUNNING:
@@ -82,9 +83,9 @@ def _advice(journal: Journal, trials: tuple[Trial, ...], now: Standing, executor
     return "" if now is Standing.COMPLETE else "repeat the start command to go on"
 
 
-def _reason(journal: Journal) -> str:
-    """Why the last trial failed or was rejected."""
-    last = journal.events()[-1]
+def _reason(journal: Journal, number: int) -> str:
+    """Why a trial failed or was rejected; the journal's last event may be another trial's amendment."""
+    last = next(event for event in reversed(journal.events()) if event.trial == number)
     body = json.loads(last.body)
     return f"{last.new}: {body.get(REASONS[last.new], body.get('note'))}"
 

@@ -139,3 +139,9 @@ def test_reading_settings_loads_neither_ray_nor_torch_nor_mlflow():
         [sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("seconds", [".inf", ".nan", "0", "1e10"])
+def test_a_time_in_which_no_connection_can_be_awaited_is_refused(seconds):
+    with pytest.raises(UsageError, match="connect_timeout_seconds"):
+        load_settings(None, [f"ray.connect_timeout_seconds={seconds}"])

@@ -16,6 +16,9 @@ from workers.randomness import generator
 from workers.rollout import rollout
 from workers.setups import Setup
 
+LONGEST_PACE_SECONDS = 86_400.0
+"""A day; a clock cannot wait for just any number."""
+
 
 class RehearsalRobot:
     """A setup whose physics is drawn once from the wide gap and never shown to the campaign.
@@ -24,16 +27,16 @@ class RehearsalRobot:
         name: of the robot, as in the registry.
         setup: what is simulated.
         seed: of the campaign; the hidden physics follows from it alone.
-        pace: least duration of a trial in s; 0 runs as fast as the simulation.
+        pace: least duration of a trial in s, at most a day; 0 runs as fast as the simulation.
         folder: where the ledger of physical starts lies.
 
     Raises:
-        ValueError: when pace is negative.
+        ValueError: when pace is negative, longer than a day, or no number.
     """
 
     def __init__(self, name: str, setup: Setup, seed: int, pace: float, folder: Path) -> None:
-        if pace < 0.0:
-            raise ValueError(f"pace must be at least 0 s, got {pace}")
+        if not 0.0 <= pace <= LONGEST_PACE_SECONDS:
+            raise ValueError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {pace}")
         self.name = name
         self.setup = setup.name
         self._simulated = setup

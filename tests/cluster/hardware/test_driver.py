@@ -10,11 +10,13 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+import ray
 
 from cluster.config import HardwareSettings, TrackingSettings
 from cluster.errors import UserError
-from cluster.hardware import driver, lock, operator
-from cluster.hardware.driver import actor_options, start
+from cluster.hardware import entrance, lock, operator
+from cluster.hardware.actor import HardwareActor, actor_options
+from cluster.hardware.driver import start
 from cluster.hardware.identity import Approval
 from cluster.hardware.plan import Plan, identify
 from cluster.hardware.standing import Standing
@@ -76,7 +78,6 @@ def test_nothing_ray_does_can_start_a_trial_twice():
     assert options == {
         "name": "hardware-franka-rehearsal",
         "namespace": "lab",
-        "get_if_exists": True,
         "lifetime": "detached",
         "num_cpus": 0,
         "resources": {"hardware": 1},
@@ -143,7 +144,7 @@ def test_a_waiting_campaign_goes_on_when_a_person_approves(ray_session, tracker,
 
 
 def test_a_cluster_without_a_robot_is_refused(ray_session, tracker, settings, tmp_path, monkeypatch):
-    monkeypatch.setattr(driver, "RESOURCE", "robot-arm")
+    monkeypatch.setattr(entrance, "RESOURCE", "robot-arm")
     with pytest.raises(UserError, match="no machine of the Ray cluster offers the resource 'robot-arm'"):
         start(settings, ray_session, tracker, plan_in(tmp_path), lambda _: None, print)
 
@@ -157,6 +158,80 @@ def test_a_folder_of_another_campaign_is_refused_and_the_robot_is_free_afterward
         start(settings, ray_session, tracker, plan_in(tmp_path, trials=1), lambda _: None, print)
     last = start(settings, ray_session, tracker, plan_in(tmp_path / "other"), lambda _: None, print)
     assert last.standing is Standing.COMPLETE
+
+
+@pytest.fixture
+def neighbour(ray_session, settings):  # noqa: ARG001 - Ray must be connected
+    """The actor of a killed command: it holds the robot's machine, for another robot."""
+    options = actor_options("yumi-rehearsal", settings.namespace, "detached")
+    actor = ray.remote(HardwareActor).options(**options).remote()
+    ray.wait([actor.__ray_ready__.remote()], timeout=120)
+    yield actor
+    ray.kill(actor)
+
+
+def is_there(robot, namespace):
+    try:
+        return ray.get_actor(f"hardware-{robot}", namespace) is not None
+    except ValueError:
+        return False
+
+
+def gone(robot, namespace, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while is_there(robot, namespace) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    return not is_there(robot, namespace)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("neighbour")
+def test_a_robots_machine_that_is_taken_ends_the_command_which_names_who_took_it(
+    ray_session, tracker, settings, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(entrance, "PLACE_SECONDS", 2.0)
+    monkeypatch.setattr(entrance, "NOTICE_SECONDS", 0.0)
+    joined = Session(ray_session.address, is_local=False, cpus=ray_session.cpus)
+    said = []
+    name = f"hardware-yumi-rehearsal in the namespace '{settings.namespace}'"
+    with pytest.raises(UserError, match=f"is taken by {name}; wait until that campaign has ended"):
+        start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, said.append)
+    assert [name in sentence for sentence in said] == [True]
+    assert gone("franka-rehearsal", settings.namespace)
+    assert is_there("yumi-rehearsal", settings.namespace)
+    assert starts(tmp_path) == []
+
+
+@pytest.mark.slow
+def test_a_command_interrupted_while_it_waits_leaves_nothing_behind(
+    ray_session, tracker, settings, tmp_path, neighbour, monkeypatch
+):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(entrance, "NOTICE_SECONDS", 0.0)
+    joined = Session(ray_session.address, is_local=False, cpus=ray_session.cpus)
+    with pytest.raises(KeyboardInterrupt):
+        start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, interrupt)
+    assert gone("franka-rehearsal", settings.namespace)
+    ray.kill(neighbour)
+    last = start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, print)
+    assert last.standing is Standing.COMPLETE
+    assert gone("franka-rehearsal", settings.namespace)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("neighbour")
+def test_an_actor_that_was_there_before_survives_a_command_that_found_no_place(
+    ray_session, tracker, settings, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(entrance, "PLACE_SECONDS", 2.0)
+    options = actor_options("franka-rehearsal", settings.namespace, "detached")
+    waiting = ray.remote(HardwareActor).options(**options).remote()
+    with pytest.raises(UserError, match="is taken by hardware-yumi-rehearsal"):
+        start(settings, ray_session, tracker, plan_in(tmp_path), lambda _: None, print)
+    assert not gone("franka-rehearsal", settings.namespace, seconds=2.0)
+    ray.kill(waiting)
 
 
 DRIVER = """

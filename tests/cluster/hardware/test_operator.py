@@ -142,6 +142,16 @@ def test_a_failed_trial_is_told_with_its_reason(tmp_path):
     assert operator.status(tmp_path).advice.startswith("trial 0 was failed: a motor is hot; see to it")
 
 
+def test_a_failed_trial_is_told_with_its_reason_after_another_was_amended(tmp_path):
+    journal.create(tmp_path / journal.FILE, "desk-1", IDENTITY)
+    with closing(opened(tmp_path)) as book:
+        for _ in range(2):
+            campaign.advance(campaign_on(book, DeskRobot(tmp_path, Fuse(-1), faulty=frozenset({1}))))
+    operator.resolve(tmp_path, 0, "measured", "Ada", "tape was wrong", -0.5, 0.0)
+    assert operator.status(tmp_path).advice.startswith("trial 1 was failed: a motor is hot; see to it")
+    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+
+
 def test_the_export_is_the_campaign_and_every_event(tmp_path):
     carry_out(tmp_path)
     first, *events = [json.loads(line) for line in operator.export(tmp_path)]

@@ -74,9 +74,10 @@ def test_a_plan_with_an_impossible_argument_is_refused(change, message):
         identify(**(good | change))
 
 
-def test_a_negative_pace_is_refused(tmp_path):
-    with pytest.raises(UsageError, match="pace must be at least 0 s, got -1"):
-        Plan(plan_in(tmp_path).identity, tmp_path, None, -1.0)
+@pytest.mark.parametrize("pace", [-1.0, 1e10, float("inf"), float("nan")])
+def test_a_pace_that_nothing_can_wait_for_is_refused(tmp_path, pace):
+    with pytest.raises(UsageError, match=r"pace must lie in \[0, 86400\] s, got"):
+        Plan(plan_in(tmp_path).identity, tmp_path, None, pace)
 
 
 def test_a_plan_means_the_same_folder_in_every_working_directory(monkeypatch, tmp_path):
@@ -205,3 +206,15 @@ def test_a_station_whose_driver_is_gone_is_handed_on_between_trials(tmp_path, mo
         post.advance(first)
     post.leave()
     assert operator.status(tmp_path / "first").measured == 0
+
+
+def test_a_driver_that_withdraws_empties_only_its_own_place(tmp_path):
+    post = Station()
+    plan, other = plan_in(tmp_path / "first"), plan_in(tmp_path / "second")
+    assert post.withdraw(other)
+    post.enter(plan)
+    assert not post.withdraw(other)
+    assert post.advance(plan).measured == 1
+    assert post.withdraw(plan)
+    post.enter(other)
+    post.leave()
