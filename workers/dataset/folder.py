@@ -85,8 +85,8 @@ class Dataset:
             held = f"{episode[0]} to {episode[-1]}" if len(episode) else "none"
             raise ValueError(
                 f"{self.path(shard)} must hold the episodes {shard.start} to {shard.stop - 1} of its name, "
-                f"got {held}; was it renamed? `svaedc dataset verify {self.folder}` names every such file: "
-                "remove them, and collect again"
+                f"got {held}; was it renamed? `svaedc dataset verify {self.folder}` names every such file, "
+                "`svaedc dataset repair` recomputes them"
             )
 
     def episode(self, index: int) -> Episode:

@@ -33,5 +33,6 @@ def require_own(path: Location, metadata: Mapping[bytes, bytes], identity: Ident
     if differences:
         raise ValueError(
             f"{path} belongs to another dataset; it and the folder differ in {'; '.join(differences)}. "
-            f"`svaedc dataset verify {path.parent}` names every such file: remove them, and collect again"
+            f"`svaedc dataset verify {path.parent}` names every such file, `svaedc dataset repair` "
+            "recomputes them"
         )
