@@ -22,7 +22,7 @@ from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
-from workers.tasks.task import Bad
+from workers.tasks.task import Bad, marked, worth
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -65,8 +65,8 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     """Run controller x for the setup's horizon under the given physics.
 
     Raises:
-        ValueError: when x is not a vector of D numbers in [0, 1], or physics names other parameters than
-            the setup's.
+        ValueError: when x is not a vector of D numbers in [0, 1], physics names other parameters than the
+            setup's, or the task gives bad steps or an objective that an episode cannot hold.
     """
     if physics.keys() != setup.physics.intervals.keys():
         odd = sorted(physics.keys() ^ setup.physics.intervals.keys())
@@ -117,13 +117,14 @@ def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physi
         return _diverged(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
     objective = setup.task.stopped_objective if reason else setup.task.objective
-    bad = _stopped(_stored(is_bad), setup) if reason else _stored(is_bad)
+    stored = _stored(marked(setup.task, is_bad, steps))
+    bad = _stopped(stored, setup) if reason else stored
     return Episode(
         x=x,
         xi=_held(observed.xi, setup.horizon),
         bad=bad,
         y=float(degrees(bad).mean(dtype=np.float64)),
-        f=float(np.float32(objective(observed, is_bad))),
+        f=worth(setup.task, objective(observed, is_bad)),
         stop=reason,
         physics=physics,
     )

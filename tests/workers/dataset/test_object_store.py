@@ -74,7 +74,7 @@ def test_whoever_reads_it_sees_the_episodes_of_the_disk(remote, dataset, address
     opened = open_dataset(location(address))
     assert opened == remote
     assert np.array_equal(opened.episode(17).xi, dataset.episode(17).xi)
-    assert opened.sane_episodes() == dataset.sane_episodes()
+    assert list(map(opened.sane_episodes, opened.shards())) == [7, 7, 3]
     assert statistics(opened).badness == statistics(dataset).badness
     for name, source in (("remote", opened), ("local", dataset)):
         (tmp_path / name).mkdir()
