@@ -1,6 +1,7 @@
 """What people read of a comparison: a table, a summary and a figure."""
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -15,6 +16,7 @@ from cluster.page import page
 from cluster.results import Runs, rows, write_table
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Summary
+from workers import setups
 from workers.hardware import robots
 from workers.randomness import generator
 from workers.setups import Setup
@@ -35,7 +37,8 @@ class Report:
 
 def summary_of(job: ComparisonJob, runs: Runs) -> Summary:
     """Means, intervals and paired differences over all runs of the folder."""
-    return summarise(rows(runs), Reporting(initial=job.initial), generator(0, "bootstrap", 0))
+    reporting = Reporting(initial=job.initial, broken_below=setups.load(job.setup).broken)
+    return summarise(rows(runs), reporting, generator(0, "bootstrap", 0))
 
 
 def publish(
@@ -93,8 +96,9 @@ def lines(summary: Summary) -> Iterator[str]:
             yield f"{name:>18}: no run has all {summary.trials} trials yet"
             continue
         best, broken = method.best[-1], method.broken_trials.mean
+        trouble = "" if math.isnan(broken) else f"broken {broken:.0%}, "
         yield (
             f"{name:>18}: best after {summary.trials} trials {best.mean:+.2f} "
             f"[{best.low:+.2f}, {best.high:+.2f}], mean objective of its trials "
-            f"{method.objective.mean:+.2f}, broken {broken:.0%}, {method.runs} runs"
+            f"{method.objective.mean:+.2f}, {trouble}{method.runs} runs"
         )

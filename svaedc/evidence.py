@@ -206,14 +206,16 @@ class Steadier:
         return f"{self.method}, width of the last interval, {self.panel} / {self.than}"
 
     def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
-        """Holds if the ratio is below 1; the ratio has no interval of its own."""
+        """Holds if the ratio, of equal numbers of runs, is below 1; it has no interval of its own."""
         found = [_method(panels.get(name), self.method) for name in (self.panel, self.than)]
-        if not all(method and method.runs > 1 for method in found):
+        counts = [method.runs if method else 0 for method in found]
+        if min(counts) < 2 or len(set(counts)) > 1:
             return UNKNOWN
         narrow, wide = (method.best[-1].high - method.best[-1].low for method in found if method)
         ratio = narrow / wide if wide else math.inf
-        runs = min(method.runs for method in found if method)
-        return Finding(Estimate(ratio, math.nan, math.nan), runs, "holds" if ratio < 1 else "does not hold")
+        return Finding(
+            Estimate(ratio, math.nan, math.nan), counts[0], "holds" if ratio < 1 else "does not hold"
+        )
 
 
 def _judged(

@@ -40,7 +40,7 @@ class Latents:
 
     @classmethod
     def of(cls, pool: Float[Tensor, "n D"], at: LatentMeans) -> "Latents":
-        """The latents of a pool: the one time the network sees it."""
+        """The latents of a pool."""
         with torch.no_grad():
             return cls(*_means(at, pool), at)
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy import stats
 
 RESAMPLES = 5_000
@@ -30,16 +30,39 @@ def student_t(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate
     return Estimate(mean, mean - half, mean + half)
 
 
+def proportion(hits: Bool[np.ndarray, " runs"], confidence: float) -> Estimate:
+    """Share of runs, with the exact binomial interval of Clopper and Pearson (1934)."""
+    n, k = len(hits), int(hits.sum())
+    if not n:
+        return Estimate(math.nan, math.nan, math.nan)
+    tail = (1 - confidence) / 2
+    low = float(stats.beta.ppf(tail, k, n - k + 1)) if k else 0.0
+    high = float(stats.beta.ppf(1 - tail, k + 1, n - k)) if k < n else 1.0
+    return Estimate(k / n, low, high)
+
+
+def share(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate:
+    """Mean of shares in [0, 1], one of each run; the interval of `student_t`, cut at both ends."""
+    found = student_t(values, confidence)
+    return Estimate(found.mean, *np.clip([found.low, found.high], 0, 1).tolist())
+
+
 def bootstrap(
     values: Float[np.ndarray, "runs columns"], confidence: float, rng: np.random.Generator
 ) -> tuple[Estimate, ...]:
-    """Mean of each column, with the percentile interval over resampled runs."""
+    r"""Mean of each column, with the percentile interval over resampled runs, expanded for few of them.
+
+    Plain percentiles are those of a normal distribution with s / \sqrt n of divisor n, and so too narrow: of
+    five runs a 90 % interval would hold the true mean 77 % of the time. Hesterberg (2015, The American
+    Statistician 69, section 5.3) takes percentiles as far out as Student's t with divisor n - 1 is.
+    """
     n = len(values)
     if n < 2:
         means = values.mean(axis=0) if n else np.full(values.shape[1], math.nan)
         return tuple(Estimate(float(mean), math.nan, math.nan) for mean in means)
     # A resample's mean is the mean weighted by how often each run was drawn.
     weights = rng.multinomial(n, np.full(n, 1 / n), size=RESAMPLES) / n
-    tail = (1 - confidence) / 2
+    t = stats.t.ppf((1 + confidence) / 2, n - 1)
+    tail = float(stats.norm.cdf(-math.sqrt(n / (n - 1)) * t))
     low, high = np.quantile(weights @ values, [tail, 1 - tail], axis=0)
     return tuple(map(Estimate, values.mean(axis=0).tolist(), low.tolist(), high.tolist()))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from svaedc.intervals import Estimate, bootstrap, student_t
+from svaedc.intervals import Estimate, bootstrap, proportion, share, student_t
 from svaedc.seeds import common_purpose
 from svaedc.significance import holm, sign_flip
 from svaedc.summaries import Difference, FirstSuccess, MethodSummary, Reporting, Row, Summary
@@ -37,12 +37,13 @@ def summarise(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
     Args:
         rows: Trials of all methods and runs.
         reporting: What counts as broken, and the width of intervals.
-        rng: Draws the bootstrap resamples.
+        rng: Draws the seed of resamples and sign patterns; those of a pair of methods depend on their names
+            only, so A - B mirrors B - A, and a further method changes neither.
 
     Raises:
         ValueError: There are no rows, one trial has two, or reporting and tuning seeds are mixed.
     """
-    by_method = _by_method(rows)
+    by_method, seed = _by_method(rows), int(rng.integers(2**32))
     length = max(len(trials) for runs in by_method.values() for trials in runs.values())
     complete = {name: _complete(by_method[name], length) for name in sorted(by_method)}
     return Summary(
@@ -50,7 +51,9 @@ def summarise(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
         purpose=common_purpose(run for runs in by_method.values() for run in runs),
         methods={name: _of_method(runs, reporting) for name, runs in complete.items()},
         differences=tuple(
-            difference for method in complete for difference in _differences(method, complete, reporting, rng)
+            difference
+            for method in complete
+            for difference in _differences(method, complete, reporting, seed)
         ),
     )
 
@@ -81,6 +84,9 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
     def estimate(per_run: Float[np.ndarray, " runs"]) -> Estimate:
         return student_t(per_run, reporting.confidence)
 
+    def part(of_trials: Float[np.ndarray, "runs trials"]) -> Estimate:
+        return share(_mean_of_rows(of_trials), reporting.confidence)
+
     f, success = runs.f[:, reporting.initial :], runs.success[:, reporting.initial :]
     return MethodSummary(
         runs=len(runs.run),
@@ -89,10 +95,12 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
         median_best=_medians(runs.best),
         objective=estimate(_mean_of_rows(f)),
         first_success=_first_success(runs.success, reporting),
-        successful_runs=estimate(runs.success.any(axis=1).astype(float)),
-        successful_trials=estimate(_mean_of_rows(success.astype(float))),
-        broken_trials=estimate(_mean_of_rows(np.where(np.isnan(f), math.nan, f < reporting.broken_below))),
-        failed_trials=estimate(_mean_of_rows(np.isnan(f).astype(float))),
+        successful_runs=proportion(np.asarray(runs.success.any(axis=1)), reporting.confidence),
+        successful_trials=part(success.astype(float)),
+        broken_trials=part(
+            np.where(np.isnan(f - reporting.broken_below), math.nan, f < reporting.broken_below)
+        ),
+        failed_trials=part(np.isnan(f).astype(float)),
     )
 
 
@@ -110,15 +118,18 @@ def _first_success(success: Bool[np.ndarray, "runs trials"], reporting: Reportin
 
 
 def _differences(
-    method: str, complete: Mapping[str, _Runs], reporting: Reporting, rng: np.random.Generator
+    method: str, complete: Mapping[str, _Runs], reporting: Reporting, seed: int
 ) -> list[Difference]:
     """A method against every other, its p values corrected together."""
     baselines = [name for name in complete if name != method]
+    rngs = [np.random.default_rng([seed, *"\n".join(sorted((method, name))).encode()]) for name in baselines]
     paired = [_paired(complete[method], complete[name], reporting) for name in baselines]
     if not paired:
         return []
-    p = holm(np.stack([sign_flip(values, rng) for values in paired]))
-    estimates = [bootstrap(values, reporting.confidence, rng) for values in paired]
+    p = holm(np.stack([sign_flip(values, rng) for values, rng in zip(paired, rngs, strict=True)]))
+    estimates = [
+        bootstrap(values, reporting.confidence, rng) for values, rng in zip(paired, rngs, strict=True)
+    ]
     return [
         Difference(method, name, len(values), each[:-1], each[-1], tuple(p_values[:-1]), p_values[-1])
         for name, values, each, p_values in zip(baselines, paired, estimates, p.tolist(), strict=True)

@@ -34,12 +34,13 @@ class Reporting:
 
     Attributes:
         initial: Shared first trials, which say nothing about a method's own suggestions.
-        broken_below: A trial with an objective below this counts as broken.
+        broken_below: A trial with an objective below this counts as broken; NaN where the task has no such
+            objective, and then no share is told.
         confidence: Of every interval.
     """
 
     initial: int = 2
-    broken_below: float = -0.5
+    broken_below: float = math.nan
     confidence: float = 0.9
 
     def __post_init__(self) -> None:

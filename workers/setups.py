@@ -3,6 +3,7 @@
 import difflib
 import hashlib
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -50,6 +51,7 @@ class Setup:
         success: an episode with f above this succeeded.
         stop: ends an episode early; of stand-ins for hardware only.
         code: SHA-256 of the file of a user's module; "" for the setups that ship.
+        broken: an episode with f below this broke something; NaN where f does not tell.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Setup:
     success: float
     stop: StopRule = never
     code: str = ""
+    broken: float = math.nan
 
     def __post_init__(self) -> None:
         """Refuse bad conditions that the bits of a step cannot hold, or that cannot be told apart."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy import stats
 
-from svaedc.intervals import Estimate, bootstrap, student_t
+from svaedc.intervals import Estimate, bootstrap, proportion, share, student_t
 from svaedc.significance import holm, sign_flip
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row
@@ -31,7 +31,7 @@ def two_methods(runs=8, trials=6):
 
 
 def summary(given, reporting=None, seed=0):
-    return summarise(given, reporting or Reporting(), np.random.default_rng(seed))
+    return summarise(given, reporting or Reporting(broken_below=-0.5), np.random.default_rng(seed))
 
 
 def test_student_t_interval_is_that_of_scipy():
@@ -44,11 +44,48 @@ def test_student_t_interval_is_that_of_scipy():
 def test_bootstrap_interval_is_that_of_scipy_up_to_its_own_noise():
     values = np.random.default_rng(2).exponential(size=(40, 1))
     (ours,) = bootstrap(values, 0.9, np.random.default_rng(3))
+    # As many standard errors out as Student's t with divisor n - 1.
+    level = 1 - 2 * stats.norm.cdf(-stats.t.ppf(0.95, 39) * math.sqrt(40 / 39))
     theirs = stats.bootstrap(
-        (values[:, 0],), np.mean, confidence_level=0.9, method="percentile", rng=np.random.default_rng(4)
+        (values[:, 0],), np.mean, confidence_level=level, method="percentile", rng=np.random.default_rng(4)
     ).confidence_interval
     assert ours.mean == pytest.approx(values.mean())
     assert (ours.low, ours.high) == pytest.approx((theirs.low, theirs.high), abs=0.02)
+
+
+@pytest.mark.parametrize("n", [5, 10, 50])
+def test_bootstrap_interval_holds_the_truth_as_often_as_it_says(n):
+    # Each column is a comparison of its own, whose true difference is 0.
+    found = bootstrap(np.random.default_rng(n).normal(size=(n, 2_000)), 0.9, np.random.default_rng(0))
+    assert np.mean([each.low <= 0 <= each.high for each in found]) == pytest.approx(0.9, abs=0.03)
+
+
+def test_a_share_of_runs_has_the_exact_binomial_interval():
+    theirs = stats.binomtest(4, 5).proportion_ci(0.9, method="exact")
+    ours = proportion(np.array([True, True, False, True, True]), 0.9)
+    assert (ours.mean, ours.low, ours.high) == pytest.approx((0.8, theirs.low, theirs.high))
+    always = proportion(np.ones(5, dtype=bool), 0.9)
+    assert (always.mean, always.high) == (1, 1)
+    assert always.low == pytest.approx(0.05 ** (1 / 5))
+    assert math.isnan(proportion(np.zeros(0, dtype=bool), 0.9).mean)
+
+
+def test_an_interval_of_shares_stays_between_0_and_1():
+    found = share(np.array([0.0, 0.0, 0.0, 0.1]), 0.9)
+    assert (found.mean, found.low) == (0.025, 0)
+    assert share(np.array([1.0, 1.0, 0.9]), 0.9).high == 1
+
+
+def test_a_difference_mirrors_its_reverse_and_no_other_method_changes_it():
+    rng = np.random.default_rng(0)
+    two = [row for name in ("one", "other") for row in rows(name, rng.normal(size=(6, 4)))]
+    more = [*two, *rows("another", rng.normal(size=(6, 4)))]
+    pairs = {(each.method, each.baseline): each for each in summary(two, Reporting()).differences}
+    ours, theirs = pairs["one", "other"].best[-1], pairs["other", "one"].best[-1]
+    assert (ours.low, ours.high) == pytest.approx((-theirs.high, -theirs.low))
+    assert pairs["one", "other"].p_objective == pairs["other", "one"].p_objective
+    among = {(each.method, each.baseline): each for each in summary(more, Reporting()).differences}
+    assert among["one", "other"].best == pairs["one", "other"].best
 
 
 def test_bootstrap_of_equal_values_has_no_width():
@@ -91,6 +128,7 @@ def test_broken_and_failed_trials_are_counted_apart():
     assert ours.failed_trials.mean == pytest.approx((1 / 4 + 0) / 2)
     lenient = summary(rows("ours", f), Reporting(broken_below=-1.0)).methods["ours"]
     assert lenient.broken_trials.mean == pytest.approx((1 / 3 + 0) / 2)
+    assert math.isnan(summary(rows("ours", f), Reporting()).methods["ours"].broken_trials.mean)
 
 
 def test_trials_needed_are_counted_from_the_first_suggestion():

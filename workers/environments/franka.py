@@ -21,6 +21,7 @@ TABLE_Y = (-0.45, 0.45)  # m
 ROLL = {"mass": 2.0, "friction": 0.3, "rolling_friction": 0.01, "restitution": 0.05}  # kg, then coefficients
 STARTS = ((0.32, 0.15), (0.50, 0.15))  # m; the rolls are pushed towards -y
 SUCCESS = 0.4  # m pushed in total, both upright
+BROKEN = -0.5  # m: at least one of them fell
 
 ARM = ArmModel(
     urdf="franka_panda/panda.urdf",
@@ -83,4 +84,5 @@ def setup_of(name: str, model: TabletopModel) -> Setup:
         gaps=model.gaps(),
         objective_limits=task.objective_limits,
         success=SUCCESS,
+        broken=BROKEN,
     )

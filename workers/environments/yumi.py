@@ -21,6 +21,7 @@ MARGIN = 0.05  # m that the hand may leave the table
 ROLL = {"mass": 0.15, "friction": 0.3, "rolling_friction": 0.01, "restitution": 0.05}  # kg, then coefficients
 STARTS = ((0.31, -0.30), (0.43, -0.30))  # m; the rolls are pushed towards +y
 SUCCESS = 0.4  # m pushed in total, both upright
+BROKEN = -0.5  # m: at least one of them fell
 
 ARM = ArmModel(
     urdf=str(Path(__file__).parent / "urdf" / "yumi.urdf"),
@@ -75,4 +76,5 @@ def setup_at(name: str, share: float) -> Setup:
         gaps=model.gaps(),
         objective_limits=task.objective_limits,
         success=SUCCESS,
+        broken=BROKEN,
     )
