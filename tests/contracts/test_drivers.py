@@ -140,13 +140,20 @@ def test_a_stop_and_a_break_off_of_the_documented_driver_are_faults_without_meas
         raise OSError("joint 3 is hot")
 
     def waiting(x, stopped):
+        moving.set()
         assert stopped.wait(timeout=60)
         return still(x, stopped)
 
+    def stop():
+        assert moving.wait(timeout=60)
+        driver.stop()
+
     with pytest.raises(RobotFault, match="trial a broke off: joint 3 is hot"):
         documented(broken).connect(SEED, 0.0, tmp_path).run("a", np.full(48, 0.5))
-    driver = documented(waiting).connect(SEED, 0.0, tmp_path)
-    threading.Timer(0.1, driver.stop).start()
+    moving, driver = threading.Event(), documented(waiting).connect(SEED, 0.0, tmp_path)
+    stopping = threading.Thread(target=stop)
+    stopping.start()
     with pytest.raises(RobotFault, match="trial b was stopped before its end"):
         driver.run("b", np.full(48, 0.5))
+    stopping.join()
     assert motions(tmp_path) == [("a", "started"), ("b", "started")]
