@@ -71,7 +71,7 @@ def best_so_far(
     curves.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     curves.set_xlabel("trial (shaded: random, shared by all methods)")
     curves.set_ylabel("best objective so far, mean over runs")
-    curves.set_title(title, loc="left", fontsize=10)
+    figure.suptitle(title, x=0.01, horizontalalignment="left", fontsize=10)
     final.set_xlim(-0.7, len(ranked) - 0.3)
     final.set_xticks([])
     final.set_title(f"after trial {summary.trials}", fontsize=9)
