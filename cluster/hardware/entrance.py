@@ -60,13 +60,15 @@ def at_the_robot(options: dict[str, Any], plan: Plan, say: Say) -> Iterator[tupl
 
 
 def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status]:
-    deadline = time.monotonic() + PLACE_SECONDS
-    for _ in range(ENTRANCES):
+    deadline, made = time.monotonic() + PLACE_SECONDS, 0
+    while made < ENTRANCES and time.monotonic() < deadline:
         actor, is_new = _obtained(options)
+        made += is_new
         try:
             return actor, _admitted(actor, options, plan, deadline, say)
         except ActorDiedError:
-            # An earlier driver's actor on its way out: entering moves nothing, so it may be tried again.
+            # An earlier driver's actor on its way out, whose name Ray keeps for a while: entering moves
+            # nothing, so it may be tried again.
             time.sleep(POLL_SECONDS)
         except BaseException:
             if is_new:

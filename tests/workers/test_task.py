@@ -107,7 +107,7 @@ def test_a_graded_task_has_one_name():
             "the objective of Own must be a finite number, got nan; return one for every episode",
         ),
         (replace(quiet(1), f=float("-inf")), "must be a finite number, got -inf"),
-        (replace(quiet(1), f=None), "must be a finite number, got None"),
+        (replace(quiet(1), f=None), "must be a finite number, got nan"),
     ],
 )
 def test_what_no_episode_can_hold_is_refused_by_the_try_out(task, message):

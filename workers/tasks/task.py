@@ -70,16 +70,14 @@ def marked(task: Task, bad: Any, steps: int) -> Bad:
     return rows.astype(np.float32, copy=False)
 
 
-def worth(task: Task, objective: Any) -> float:
-    """What the objective of a task returned, as the float32 that an episode holds.
+def require_objective(task: Task, f: float) -> None:
+    """Refuse an objective of a task that no dataset can hold.
 
     Raises:
         ValueError: it is not a finite number.
     """
-    f = float(np.float32(objective))
     if not math.isfinite(f):
         raise ValueError(
-            f"the objective of {type(task).__name__} must be a finite number, got {objective}; return one "
+            f"the objective of {type(task).__name__} must be a finite number, got {f}; return one "
             "for every episode, the lower limit of f for one that is worth nothing"
         )
-    return f
