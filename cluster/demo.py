@@ -9,11 +9,12 @@ from cluster.collect import collect
 from cluster.compare import Comparison, compare
 from cluster.config import Settings
 from cluster.grid import Grid
-from cluster.placement import free_machines, place
+from cluster.placement import free_machines
 from cluster.progress import say, timed
 from cluster.session import Session
 from cluster.tracking import Tracker
 from cluster.train import MINIMUM_EPISODES, train
+from cluster.training_submission import placed
 from svaedc.summaries import Difference
 from workers import setups
 
@@ -119,7 +120,7 @@ def _preflight(settings: Settings, size: DemoSize, session: Session) -> None:
     """Refuse now what a later stage would refuse after minutes of work."""
     shards = math.ceil(size.episodes / settings.collect.episodes_per_shard)
     session.preflight(min(settings.collect.actor_count(session.cpus), shards))
-    place(settings.train.workers, settings.train.threads, free_machines(session))
+    placed(settings.train, free_machines(session))
     session.preflight(settings.compare.slots)
 
 

@@ -71,7 +71,7 @@ def best_so_far(
     curves.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     curves.set_xlabel("trial (shaded: random, shared by all methods)")
     curves.set_ylabel("best objective so far, mean over runs")
-    curves.set_title(title, loc="left", fontsize=10)
+    figure.suptitle(title, x=0.01, horizontalalignment="left", fontsize=10)
     final.set_xlim(-0.7, len(ranked) - 0.3)
     final.set_xticks([])
     final.set_title(f"after trial {summary.trials}", fontsize=9)
@@ -140,14 +140,17 @@ def reconstruction(path: Path, model: SvaeDc, held_out: Episodes, identity: Iden
 
 
 def _moving_channels(held_out: Episodes, identity: Identity) -> list[int]:
-    """The channels that move most: one angle, two positions, one part of an orientation, as there are any."""
+    """The channels that move most: one angle, two positions, one part of an orientation, as there are any.
+
+    Of a robot that has none of these (speeds, forces), any four.
+    """
     spread = held_out.xi[held_out.rows[:256]].std(axis=(0, 2))
     units = np.array([unit for _, unit, _, _ in identity.observation])
     chosen: list[int] = []
     for unit, count in (("rad", 1), ("m", 2), ("1", 1)):
         candidates = np.flatnonzero(units == unit)
         chosen += candidates[np.argsort(-spread[candidates], kind="stable")][:count].tolist()
-    return chosen
+    return chosen or np.argsort(-spread, kind="stable")[:4].tolist()
 
 
 def _draw(axes: Axes, curves: Mapping[str, np.ndarray], identity: Identity) -> None:

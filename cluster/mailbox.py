@@ -9,6 +9,8 @@ import ray
 from ray.exceptions import RayError
 
 _POLL_SECONDS = 0.5
+_FAREWELL_SECONDS = 5.0
+"""How long an interrupted block waits for what `receive` is doing."""
 
 
 class Mailbox:
@@ -31,7 +33,8 @@ class Mailbox:
 def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
     """A mailbox whose messages are handed to `receive`, on a thread of the driver, until the block ends.
 
-    An error in `receive` keeps no later message from it; the first is raised at the end of the block.
+    An error in `receive` keeps no later message from it; the first is raised at the end of the block. A block
+    that ends by Ctrl-C or an exit does not wait for a `receive` that takes long, nor for what it left over.
     """
     actor: Any = ray.remote(Mailbox)
     box = actor.options(num_cpus=0).remote()
@@ -44,12 +47,17 @@ def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
 
     thread = threading.Thread(target=deliver, daemon=True)
     thread.start()
+    patience = None
     try:
         yield box
+    except (KeyboardInterrupt, SystemExit):
+        patience = _FAREWELL_SECONDS
+        raise
     finally:
         ended.set()
-        thread.join()
-        _take(box, receive, errors)
+        thread.join(patience)
+        if not thread.is_alive():
+            _take(box, receive, errors)
         ray.kill(box)
     if errors:
         raise errors[0]

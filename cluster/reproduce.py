@@ -5,7 +5,7 @@ from cluster.collect import collect
 from cluster.compare import compare
 from cluster.config import Settings
 from cluster.grid import Grid
-from cluster.placement import free_machines, place
+from cluster.placement import free_machines
 from cluster.progress import say, timed
 from cluster.recipe import Panel
 from cluster.reproduction import Reproduction
@@ -13,6 +13,7 @@ from cluster.reproduction_report import Table, publish, table
 from cluster.session import Session
 from cluster.tracking import Tracker
 from cluster.train import train
+from cluster.training_submission import placed
 from svaedc.summaries import Summary
 from workers import setups
 
@@ -54,8 +55,7 @@ def _preflight(reproduction: Reproduction, settings: Settings, session: Session)
     if reproduction.collects:
         session.preflight(settings.collect.actor_count(session.cpus))
     if not all(map(reproduction.is_trained, reproduction.trains)):
-        train = settings.train
-        place(train.workers, train.threads, free_machines(session), train.device)
+        placed(settings.train, free_machines(session))
 
 
 def _collect(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> None:

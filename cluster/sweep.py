@@ -1,7 +1,8 @@
 """`svaedc train --sweep`: train around a preset on Ray Tune, and tell which model is better for BO."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,13 +11,15 @@ from ray.tune import RunConfig, TuneConfig, Tuner
 
 from cluster.comparison_runs import silence_tune
 from cluster.config import TrainSettings
-from cluster.errors import UserError
+from cluster.errors import UsageError, UserError
 from cluster.files import replacing
 from cluster.progress import say, timed
 from cluster.session import Session
 from cluster.sweep_job import METHODS, RUNS, TRIALS, Point, run_point
 from cluster.tracking import Run, Tracker
-from cluster.train import planned, trainable
+from cluster.train import begun, planned, trainable, working_in
+from svaedc.presets import usual_stride
+from workers.dataset.folder import Dataset
 from workers.dataset.location import Location
 
 TABLE: Final = "sweep.md"
@@ -51,43 +54,84 @@ def sweep(
     What is finished is kept: the same command goes on with the rest.
 
     Raises:
-        UserError: the dataset or an existing folder does not fit, or points kept failing.
+        UserError: the dataset, an existing folder or the cluster does not fit, another command trains into
+            the folder, or points kept failing.
+        UsageError: a setting asks for what a sweep does not do.
     """
-    points = _plan(folder, model, preset, seed, settings, changes)
-    missing = [point for point in points if not point.result]
-    say(f"{len(points)} models, {len(points) - len(missing)} of them trained already")
-    parameters = {"preset": preset, "seed": seed, **settings.model_dump(mode="json")}
-    with tracker.run(f"sweep {preset}", "sweep", parameters) as run:
-        if missing:
-            with timed(f"training {len(missing)} models, {session.cpus} at a time"):
-                _submit(missing, session.cpus)
-        return _record(points, model, run)
+    require_one_cpu(settings)
+    session.preflight(1)
+    dataset = _swept(folder)
+    with working_in(model):
+        points = _plan(dataset, model, preset, seed, settings, changes)
+        missing = [point for point in points if not point.result]
+        say(f"{len(points)} models, {len(points) - len(missing)} of them trained already")
+        own = {"preset": preset, "seed": seed, "stride": settings.stride_or(usual_stride(preset))}
+        with tracker.run(f"sweep {preset}", "sweep", {**settings.model_dump(mode="json"), **own}) as run:
+            if missing:
+                with timed(f"training {len(missing)} models, {session.cpus} at a time"):
+                    _submit(missing, session.cpus)
+            return _record(points, model, run)
 
 
-def _plan(
-    folder: Location,
-    model: Path,
-    preset: str,
-    seed: int,
-    settings: TrainSettings,
-    changes: Mapping[str, Mapping[str, Any]],
-) -> list[Point]:
-    """Jobs whose caches exist, so that none decodes what another decodes too."""
-    points = []
+def require_one_cpu(settings: TrainSettings) -> None:
+    """Refuse settings of a training that a sweep would not follow.
+
+    Raises:
+        UsageError: naming the setting and the remedy.
+    """
+    followed: dict[str, tuple[object, ...]] = {
+        "workers": (1,),
+        "least_workers": ("all", 1),
+        "threads": ("all", 1),
+        "device": ("auto", "cpu"),
+        "precision": ("auto", "float32"),
+    }
+    for name, values in followed.items():
+        if getattr(settings, name) not in values:
+            raise UsageError(
+                f"a sweep trains each model on one CPU in float32, train.{name} asks for "
+                f"{getattr(settings, name)}: leave it out, or train without --sweep"
+            )
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """Turns what the cores and the disk refuse into errors for the user."""
     try:
+        yield
+    except (ValueError, LookupError, OSError) as error:
+        raise UserError(f"cannot sweep: {error}") from error
+
+
+def _swept(folder: Location) -> Dataset:
+    with _refusals():
         dataset = trainable(folder)
         if dataset.episodes() < MINIMUM_EPISODES:
             raise ValueError(
                 f"{folder} holds {dataset.episodes()} episodes, a sweep needs at least {MINIMUM_EPISODES}: "
                 "collect more with `svaedc collect`"
             )
+        return dataset
+
+
+def _plan(
+    dataset: Dataset,
+    model: Path,
+    preset: str,
+    seed: int,
+    settings: TrainSettings,
+    changes: Mapping[str, Mapping[str, Any]],
+) -> list[Point]:
+    """Jobs whose folders fit, and whose caches exist, so that none decodes what another decodes too."""
+    points = []
+    with _refusals():
         for name, change in changes.items():
             varied = settings.model_copy(update={**change})
             job = planned(dataset, model / "sweep" / name, preset, seed, varied)
-            job.settings(job.data())
-            points.append(Point(name, job))
-    except (ValueError, LookupError, OSError) as error:
-        raise UserError(f"cannot sweep: {error}") from error
+            training = job.settings(job.data()).training
+            points.append(Point(name, job, training.joint.updates + training.prior.updates))
+            if not points[-1].result:
+                begun(job, training)
     return points
 
 
@@ -105,6 +149,12 @@ def _submit(missing: Sequence[Point], slots: int) -> None:
         raise UserError(
             f"{len(results.errors)} of {len(missing)} models failed, the first with: {reason}. "
             "The others are kept, and the same command tries these again"
+        )
+    unfinished = [point for point in missing if not point.result]
+    if unfinished:
+        raise UserError(
+            f"{len(unfinished)} of {len(missing)} models were stopped by train.time_limit_seconds before "
+            "their end, and nothing is ranked without them; the same command goes on with them"
         )
 
 

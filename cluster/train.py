@@ -4,10 +4,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
-from cluster.placement import free_machines
+from cluster.folder_lock import alone_in
+from cluster.placement import Placement, free_machines
 from cluster.progress import ProgressLine, say
 from cluster.session import Session
 from cluster.tracking import Run, Tracker
@@ -16,6 +18,7 @@ from cluster.training_record import judge, read_json, record, recorded, write_js
 from cluster.training_submission import placed, submit
 from svaedc import checkpoint
 from svaedc.presets import usual_stride
+from svaedc.settings import TrainingSettings
 from svaedc.training import require_settings
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
@@ -59,24 +62,34 @@ def train(
     """Train a model on a dataset, or go on where an interrupted training stopped; returns the checkpoint.
 
     Raises:
-        UserError: the dataset, an existing checkpoint, the disk or the cluster does not fit, or a full-size
-            training collapsed.
+        UserError: the dataset, an existing checkpoint, the disk or the cluster does not fit, another command
+            trains into the folder, or a full-size training collapsed.
     """
     with _refusals(model):
         dataset = trainable(folder)
-        _folder(model)
-        plan = _checked(planned(dataset, model, preset, seed, settings), dataset)
-        trained = _trained_updates(plan)
-        summary = recorded(model, plan.updates) if trained == plan.updates else None
-    if summary is not None:
-        say(f"{model / MODEL} is already trained: nothing to do")
-    else:
-        with _refusals(model), _run(plan, tracker, settings) as run:
-            if trained < plan.updates:
-                _submit(plan, settings, session, run)
-            summary = record(plan.job, plan.cache, plan.dataset, run, settings.moments)
+        with working_in(model):
+            job = planned(dataset, model, preset, seed, settings)
+            if not (model / MODEL).exists():
+                # Before the data is decoded, which may take an hour.
+                placed(settings, free_machines(session))
+            plan = _checked(job, dataset)
+            summary = _summary(plan, settings, session, tracker)
     judge(summary, plan.updates)
     return model / MODEL
+
+
+def _summary(plan: _Plan, settings: TrainSettings, session: Session, tracker: Tracker) -> dict[str, Any]:
+    """What is recorded of the model; whatever is missing of it is made."""
+    model, trained = plan.job.model, _trained_updates(plan)
+    summary = recorded(model, plan.updates) if trained == plan.updates else None
+    if summary is not None:
+        say(f"{model / MODEL} is already trained: nothing to do")
+        return summary
+    placement = placed(settings, free_machines(session)) if trained < plan.updates else None
+    with _run(plan, tracker, settings) as run:
+        if placement is not None:
+            _submit(plan, placement, run)
+        return record(plan.job, plan.cache, plan.dataset, run, settings.moments)
 
 
 @contextmanager
@@ -113,13 +126,23 @@ def trainable(folder: Location) -> Dataset:
     return dataset
 
 
-def _folder(model: Path) -> None:
+@contextmanager
+def working_in(model: Path) -> Iterator[None]:
+    """Makes the folder of a model, and keeps other trainings out of it for as long as the block lasts.
+
+    Raises:
+        UsageError: it is a file.
+        UserError: another command trains into it.
+    """
     try:
         model.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError) as error:
         raise UsageError(
             f"--model takes a folder, {error.filename or model} is a file: name another folder"
         ) from error
+    refusal = f"another training is at work in {model}; wait for its end, or name another --model folder"
+    with alone_in(model, refusal):
+        yield
 
 
 def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
@@ -155,14 +178,24 @@ def _checked(job: TrainingJob, dataset: Dataset) -> _Plan:
     """Refuses here whatever every training process would refuse, one after the other."""
     cache = job.data()
     training = job.settings(cache).training
+    return _Plan(job, dataset, cache, begun(job, training), training.joint.updates + training.prior.updates)
+
+
+def begun(job: TrainingJob, training: TrainingSettings) -> int:
+    """Updates behind the checkpoint from which a job goes on; 0 without one.
+
+    Raises:
+        UserError: it was made with other settings.
+        ValueError: it is damaged or of another origin.
+    """
     state = saved_state(job)
-    if state is not None:
-        try:
-            require_settings(state, training)
-        except ValueError as error:
-            raise UserError(f"{job.model / STATE}: {error}, in another --model folder") from error
-    updates = training.joint.updates + training.prior.updates
-    return _Plan(job, dataset, cache, 0 if state is None else done(state, training), updates)
+    if state is None:
+        return 0
+    try:
+        require_settings(state, training)
+    except ValueError as error:
+        raise UserError(f"{job.model / STATE}: {error}, in another --model folder") from error
+    return done(state, training)
 
 
 def _trained_updates(plan: _Plan) -> int:
@@ -189,7 +222,8 @@ def _run(plan: _Plan, tracker: Tracker, settings: TrainSettings) -> Iterator[Run
     if earlier and is_begun and tracker.holds(earlier):
         started = tracker.resume(earlier)
     else:
-        parameters = {**job.origin, **settings.model_dump(mode="json")}
+        # The origin has numbers where settings may say `preset`.
+        parameters = {**settings.model_dump(mode="json"), **job.origin}
         started = tracker.run(f"train {identity.setup}", "train", parameters)
         started.dataset(identity.setup, job.origin["dataset"], plan.dataset.folder)
     with started as run:
@@ -197,8 +231,7 @@ def _run(plan: _Plan, tracker: Tracker, settings: TrainSettings) -> Iterator[Run
         yield run
 
 
-def _submit(plan: _Plan, settings: TrainSettings, session: Session, run: Run) -> None:
-    placement = placed(settings, free_machines(session))
+def _submit(plan: _Plan, placement: Placement, run: Run) -> None:
     say(f"training with {placement}")
     with ProgressLine("updates", plan.updates, plan.done) as progress:
         submit(plan.job, placement, progress, run)

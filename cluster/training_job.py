@@ -108,7 +108,7 @@ class TrainingJob:
 def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
     """Training and held-out episodes of a cache."""
     rows = np.arange(len(cache.episode))
-    return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.controller())
+    return split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.held_out())
 
 
 def bounds(dataset: Location) -> tuple[list[float], list[float]]:

@@ -1,6 +1,5 @@
 """Hands a training job to Ray Train: what is heard of it meanwhile, what it survives, and what ends it."""
 
-import errno
 import shutil
 import signal
 import threading
@@ -11,7 +10,7 @@ from dataclasses import replace
 from types import FrameType
 from typing import Any
 
-from ray.train import ControllerError, RunConfig, ScalingConfig, TrainingFailedError, WorkerGroupError
+from ray.train import RunConfig, ScalingConfig, TrainingFailedError
 from ray.train.torch import TorchTrainer
 from ray.train.v2.api.config import FailureConfig
 
@@ -21,14 +20,14 @@ from cluster.mailbox import mailbox
 from cluster.placement import Machine, Placement, place
 from cluster.progress import ProgressLine, say
 from cluster.tracking import Run
+from cluster.training_failure import explanation, is_death
 from cluster.training_job import TrainingJob, run_worker
+from cluster.training_reports import Reports
 
 DEATHS = 3
 """Deaths of training processes that one command survives, each from the last checkpoint."""
 _STARTS = 2
 """Starts of the processes that Ray Train tries anew; each waits a minute for its room."""
-_WILL_RECUR = (ValueError, OSError, ArithmeticError, LookupError)
-"""What the core and the disk raise: another try would end the same way."""
 
 
 def placed(settings: TrainSettings, machines: Sequence[Machine]) -> Placement:
@@ -52,54 +51,29 @@ def submit(job: TrainingJob, placement: Placement, progress: ProgressLine, run: 
     """Train until the job's budget or time limit is spent.
 
     Raises:
-        UserError: training failed, or, once it has ended, the MLflow store failed meanwhile.
+        UserError: training failed, or, once it has ended, the MLflow store still fails.
     """
-    with mailbox(_Reports(progress, run).receive) as box:
-        for deaths in range(DEATHS + 1):
-            try:
-                _fit(job, placement, box)
-            except TrainingFailedError as error:
-                if deaths == DEATHS or not _is_death(error):
-                    raise UserError(_explanation(error, job)) from error
-                say(f"a training process died; going on from the last checkpoint ({deaths + 1} of {DEATHS})")
-            else:
-                return
-
-
-class _Reports:
-    """Passes the reports of epochs on to the person who watches and to the run."""
-
-    def __init__(self, progress: ProgressLine, run: Run) -> None:
-        self._progress, self._run = progress, run
-        self._complained = False
-
-    def receive(self, report: dict[str, Any]) -> None:
-        """Show and record one report; a store that fails is told once and ends nothing."""
-        if "device" in report:
-            say(f"training on {report['device']}")
-        else:
-            self._show(report)
+    reports = Reports(progress, run)
+    with mailbox(reports.receive) as box:
         try:
-            self._record(report)
-        except UserError as error:
-            if not self._complained:
-                say(f"{error}. Training goes on; its curves will have gaps")
-            self._complained = True
+            _train(job, placement, box)
+        except (KeyboardInterrupt, SystemExit):
+            reports.give_up()
             raise
+    reports.complete()
 
-    def _show(self, report: dict[str, Any]) -> None:
-        metrics = report["metrics"]
-        self._progress.advance(
-            report["update"] - self._progress.done,
-            f"{report['stage']}, error against the median: reconstructed {metrics['held_out/rec_norm']:.2f}, "
-            f"generated {metrics['held_out/gen_norm']:.2f}",
-        )
 
-    def _record(self, report: dict[str, Any]) -> None:
-        if "device" in report:
-            self._run.tags({"svaedc.device": report["device"]})
+def _train(job: TrainingJob, placement: Placement, box: Any) -> None:
+    """Tries again, from the last checkpoint, when processes die."""
+    for deaths in range(DEATHS + 1):
+        try:
+            _fit(job, placement, box)
+        except TrainingFailedError as error:
+            if deaths == DEATHS or not is_death(error):
+                raise UserError(explanation(error, job.model)) from error
+            say(f"a training process died; going on from the last checkpoint ({deaths + 1} of {DEATHS})")
         else:
-            self._run.metrics(report["metrics"], step=report["update"])
+            return
 
 
 def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
@@ -159,29 +133,3 @@ def interrupts_kept() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, interrupt)
         signal.signal(signal.SIGTERM, terminate)
-
-
-def _is_death(error: TrainingFailedError) -> bool:
-    """Whether processes were lost, which another try survives; the errors of the others only follow."""
-    if not isinstance(error, WorkerGroupError):
-        return False
-    return not any(_recurs(failure) for failure in error.worker_failures.values())
-
-
-def _recurs(failure: Exception) -> bool:
-    return isinstance(failure, _WILL_RECUR) and not isinstance(failure, ConnectionError)
-
-
-def _explanation(error: TrainingFailedError, job: TrainingJob) -> str:
-    """One sentence and the remedy."""
-    if isinstance(error, ControllerError):
-        reason = str(error.controller_failure).partition("\n")[0]
-        return f"the training processes could not start: {reason}; try again when the cluster has room"
-    failures = list(getattr(error, "worker_failures", {}).values()) or [error]
-    cause = next((failure for failure in failures if _recurs(failure)), failures[0])
-    if isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT):
-        return (
-            f"training stopped: {cause}; free some space and run the same command: it goes on from the last "
-            f"checkpoint in {job.model}"
-        )
-    return f"training failed: {str(cause).strip().splitlines()[-1]}"

@@ -83,7 +83,7 @@ def compute(source: Source, model_path: Path, cell: Cell) -> Result:
 def candidates(cache: TrainingCache, count: int) -> Episodes:
     """The first held-out episodes."""
     rows = np.arange(len(cache.episode))
-    _, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.controller())
+    _, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.held_out())
     return Episodes(held_out.x, held_out.xi, held_out.bad, held_out.y, held_out.rows[:count])
 
 

@@ -49,7 +49,7 @@ class Source:
 def halves(cache: TrainingCache, count: int) -> tuple[Episodes, Episodes]:
     """The first `count` training episodes, so that larger selections hold the smaller; all held-out ones."""
     rows = np.arange(len(cache.episode))
-    training, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.controller())
+    training, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.held_out())
     if count > len(training):
         raise ValueError(f"there are {len(training)} training episodes, got a count of {count}; collect more")
     return replace(training, rows=training.rows[:count]), held_out

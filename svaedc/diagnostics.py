@@ -1,6 +1,7 @@
 """What a trained model has learnt, measured on held-out episodes, and whether it has collapsed."""
 
 from functools import partial
+from math import isnan
 from typing import Final
 
 import torch
@@ -20,6 +21,10 @@ REMEDIES: Final = {  # in brackets the setting, as the section `train` names it
     "rec_norm": "raise the learning rate (learning_rate) or train longer (updates)",
     "gen_norm": "collect more episodes, or train longer (updates)",
 }
+_UNDEFINED: Final = (
+    "its weights are no longer finite, or nothing moves in the held-out episodes: lower the learning rate "
+    "(learning_rate), or look at the episodes (svaedc render)"
+)
 
 
 def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
@@ -56,15 +61,27 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
 
 
 def collapse(metrics: dict[str, float]) -> str | None:
-    """Why a model must not be used, with a remedy, or None when it has learnt something of everything."""
+    """Why a model must not be used, with a remedy, or None when it has learnt something of everything.
+
+    Args:
+        metrics: Those of `evaluate`. Of an SVAE, whatever is about y is NaN, and y is not asked of it.
+    """
     too_little = {"active_share": 1 / 3, "corr_y_rec": 0.5}
     too_much = {"rec_norm": 0.95, "gen_norm": 0.98}
+    for name in too_much:
+        if isnan(metrics[name]):
+            return f"the model collapsed: {name} is not a number; {_UNDEFINED}"
     collapsed = [name for name, least in too_little.items() if metrics[name] < least]
     collapsed += [name for name, most in too_much.items() if metrics[name] > most]
-    if not collapsed:
-        return None
-    name = collapsed[0]
-    return f"the model collapsed: {name} is {metrics[name]:.2f}; {REMEDIES[name]}"
+    if collapsed:
+        name = collapsed[0]
+        return f"the model collapsed: {name} is {metrics[name]:.2f}; {REMEDIES[name]}"
+    if isnan(metrics["corr_y_rec"]) and not isnan(metrics["mae_y_rec"]):  # an SVAE predicts no y at all
+        return (
+            "the model cannot have learnt y, which is the same in all held-out episodes: use another G_bad "
+            "(svaedc collect --bad), or train without badness (model=svae)"
+        )
+    return None
 
 
 def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *rest"]]:

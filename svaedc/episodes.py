@@ -103,20 +103,22 @@ def measured_over(
     return results
 
 
-def split(episodes: Episodes, controller: Integer[np.ndarray, " episodes"]) -> tuple[Episodes, Episodes]:
-    """Training and held-out episodes: those of every controller whose number ends in 9 are held out.
+def split(episodes: Episodes, held_out: Integer[np.ndarray, " held_out"]) -> tuple[Episodes, Episodes]:
+    """Training and held-out episodes.
 
     Args:
         episodes: The selection to split.
-        controller: The dataset-wide number of each one's x, so that no controller is on both sides, and
-            extending a dataset moves no episode across.
+        held_out: Those of its rows that are held out; the cache knows them (`TrainingCache.held_out`).
 
     Raises:
-        ValueError: The numbers do not fit the selection.
+        ValueError: A row is not in the selection.
     """
-    if len(controller) != len(episodes):
-        raise ValueError(f"{len(episodes)} episodes need as many numbers, got {len(controller)}")
-    is_held_out = controller % 10 == 9
+    strange = np.setdiff1d(held_out, episodes.rows)
+    if len(strange):
+        raise ValueError(
+            f"held-out rows must be rows of the selection, got {strange[0]}; take them from the same cache"
+        )
+    is_held_out = np.isin(episodes.rows, held_out)
     return (
         replace(episodes, rows=episodes.rows[~is_held_out]),
         replace(episodes, rows=episodes.rows[is_held_out]),

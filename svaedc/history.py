@@ -61,10 +61,6 @@ class History:
         """Every controller a trial was spent on, measured ones first."""
         return np.concatenate([self.x, self.failed])
 
-    def has_failed(self, x: Float[np.ndarray, " D"]) -> bool:
-        """Whether this controller was tried and gave no objective."""
-        return bool((self.failed == x).all(axis=1).any())
-
     def append(self, x: Float[np.ndarray, " D"], f: float) -> "History":
         """The history after one more trial; a trial without objective (f is NaN) counts as failed."""
         if np.isnan(f):

@@ -63,7 +63,16 @@ class Balanced:
             )
 
     def __call__(self, count: int, rng: np.random.Generator) -> Int64[np.ndarray, " count"]:
-        """Positions of one pass."""
+        """Positions of one pass.
+
+        Raises:
+            ValueError: `count` is not the number of the values.
+        """
+        if count != len(self.values):
+            raise ValueError(
+                f"balanced sampling of {count} episodes needs as many values, got {len(self.values)}; take "
+                "those of the training episodes"
+            )
         members = self._strata()
         quotas = np.full(len(members), count // len(members))
         quotas[rng.permutation(len(members))[: count % len(members)]] += 1

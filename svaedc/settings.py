@@ -133,7 +133,7 @@ class TrainingSettings:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
 
     def with_updates(self, joint: int, prior: int) -> "TrainingSettings":
-        """The same settings with other budgets; decaying schedules stretch along."""
+        """The same settings with other budgets; `cosine` ends with them, `halving` goes by updates alone."""
         return replace(
             self, joint=replace(self.joint, updates=joint), prior=replace(self.prior, updates=prior)
         )

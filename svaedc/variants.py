@@ -25,17 +25,19 @@ def varied(preset: Preset, changes: Mapping[str, Any]) -> Preset:
 
     Args:
         preset: Model and training.
-        changes: Values by name; `VARIATIONS` has the names, and `preset` changes nothing.
+        changes: Values by name; `VARIATIONS` has the names, and `preset` changes nothing. They are applied in
+            the order of `VARIATIONS`, whatever their own: what is narrower comes after what holds it.
 
     Raises:
         LookupError: There is no such choice, or it has no such value; the nearest is named.
         ValueError: A number is out of its range.
     """
-    for name, value in changes.items():
+    for name in changes:
         if name not in VARIATIONS:
             raise LookupError(_unknown("choice", name, VARIATIONS))
-        if value != KEPT:
-            preset = VARIATIONS[name](preset, value)
+    for name, change in VARIATIONS.items():
+        if changes.get(name, KEPT) != KEPT:
+            preset = change(preset, changes[name])
     return preset
 
 

@@ -48,7 +48,8 @@ def require_working(setup: Setup, seed: int) -> None:
     """Roll out one episode if users supplied the robot or G_bad: their mistakes are no fault of a shard.
 
     Raises:
-        ValueError: something in their code is not as it must be.
+        ValueError: something in their code is not as it must be, such as the shape of what G_bad returns, or
+            an objective that is no finite number.
         OSError: a file of theirs is missing.
     """
     if setup.name not in MODULES or setup.task.bad_name:

@@ -22,7 +22,7 @@ from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
-from workers.tasks.task import Bad
+from workers.tasks.task import Bad, marked, require_objective
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -65,8 +65,8 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     """Run controller x for the setup's horizon under the given physics.
 
     Raises:
-        ValueError: when x is not a vector of D numbers in [0, 1], or physics names other parameters than
-            the setup's.
+        ValueError: when x is not a vector of D numbers in [0, 1], physics names other parameters than the
+            setup's, or the task gives bad steps that an episode cannot hold.
     """
     if physics.keys() != setup.physics.intervals.keys():
         odd = sorted(physics.keys() ^ setup.physics.intervals.keys())
@@ -95,9 +95,15 @@ def random_episode(
         seed: of the dataset.
         index: of the episode.
         repeats: how many consecutive episodes share a controller; each has physics of its own.
+
+    Raises:
+        ValueError: as `rollout` does, or the objective is not finite, which no dataset can hold; a trial of
+            Bayesian optimisation without one counts as failed.
     """
     x = generator(seed, "controller", index // repeats).random(setup.dimensions, dtype=np.float32)
-    return rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
+    episode = rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
+    require_objective(setup.task, episode.f)
+    return episode
 
 
 def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
@@ -117,7 +123,8 @@ def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physi
         return _diverged(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
     objective = setup.task.stopped_objective if reason else setup.task.objective
-    bad = _stopped(_stored(is_bad), setup) if reason else _stored(is_bad)
+    stored = _stored(marked(setup.task, is_bad, steps))
+    bad = _stopped(stored, setup) if reason else stored
     return Episode(
         x=x,
         xi=_held(observed.xi, setup.horizon),

@@ -16,7 +16,7 @@ from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges, ranges
 from workers.tasks.stop import STOPPED, StopRule, never
-from workers.tasks.task import Task
+from workers.tasks.task import BITS, Task
 
 MODULES = {
     "franka": "workers.environments.franka",
@@ -46,7 +46,8 @@ class Setup:
         control_step: seconds of each.
         physics: ranges of data collection.
         gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
-        objective_limits: the range of f, fixed; BO scales f by it.
+        objective_limits: the objectives that BO sees as 0 and 1, fixed. No f is clipped to them: one outside
+            is seen below 0 or above 1. A diverged episode has the lower one.
         success: an episode with f above this succeeded.
         stop: ends an episode early; of stand-ins for hardware only.
         code: SHA-256 of the file of a user's module; "" for the setups that ship.
@@ -67,6 +68,25 @@ class Setup:
     stop: StopRule = never
     code: str = ""
     broken: float = math.nan
+
+    def __post_init__(self) -> None:
+        """Refuse bad conditions that the bits of a step cannot hold, or that cannot be told apart."""
+        names, graded = self.task.conditions, self.task.graded
+        if graded and len(names) != 1:
+            raise ValueError(
+                f"{self.name} has a graded task, which must have one name in `conditions`, that of its "
+                f"degree, got {len(names)}: {', '.join(names)}; leave one"
+            )
+        if not 1 <= len(self.conditions) <= BITS:
+            raise ValueError(
+                f"{self.name} must have 1 to {BITS} bad conditions, {STOPPED!r} of a stop rule included, got "
+                f"{len(self.conditions)}: {', '.join(self.conditions)}; join some of them"
+            )
+        if len({*names}) != len(names) or (STOPPED in names and not graded):
+            raise ValueError(
+                f"the bad conditions of {self.name} must differ, and none be called {STOPPED!r}, got "
+                f"{', '.join(names)}; rename one"
+            )
 
     @property
     def dimensions(self) -> int:

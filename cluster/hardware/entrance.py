@@ -61,9 +61,10 @@ def at_the_robot(options: dict[str, Any], plan: Plan, say: Say) -> Iterator[tupl
 
 
 def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status]:
-    deadline = time.monotonic() + PLACE_SECONDS
-    for _ in range(ENTRANCES):
+    deadline, made = time.monotonic() + PLACE_SECONDS, 0
+    while made < ENTRANCES and time.monotonic() < deadline:
         actor, is_new = _obtained(options)
+        made += is_new
         try:
             return actor, _admitted(actor, options, plan, deadline, say)
         except ActorDiedError:

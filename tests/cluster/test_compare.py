@@ -437,11 +437,10 @@ def test_a_store_that_failed_once_is_left_alone_until_the_end(tmp_path, capsys):
     tracked = begin(tmp_path / "out", open_tracker(store), "compare", {})
     (tmp_path / "mlflow.db").unlink()
     (tmp_path / "mlflow.db").mkdir()
-    with tracked.run:
-        for seed in (1000, 1001):
-            tracked.try_child(RunKey("random", seed), [trial(0)])
-        with pytest.raises(UserError, match="cannot be used"):
-            tracked.child(RunKey("random", 1000), [trial(0)])
+    for seed in (1000, 1001):
+        tracked.try_child(RunKey("random", seed), [trial(0)])
+    with pytest.raises(UserError, match="cannot be used"):
+        tracked.child(RunKey("random", 1000), [trial(0)])
     assert capsys.readouterr().err.count("The comparison goes on") == 1
 
 

@@ -81,12 +81,20 @@ def test_the_end_names_every_result_and_repeats_a_collapse(tmp_path, collapsed):
         (Settings(compare=CompareSettings(slots=2)), 2),
         (Settings(compare=CompareSettings(slots=1), train=TrainSettings(workers=3)), 3),
         (Settings(compare=CompareSettings(slots=1), collect=CollectSettings(actors=4)), 4),
+        (Settings(compare=CompareSettings(slots=2), train=TrainSettings(workers=3, least_workers=1)), 2),
     ],
 )
 def test_a_cluster_too_small_for_any_stage_is_refused_before_the_first(
     tmp_path, tracking_settings, settings, cpus
 ):
     with pytest.raises(UserError, match=f"this needs {cpus} CPUs"):
+        demo(tmp_path / "demo", settings, ALONE, open_tracker(tracking_settings))
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_gpu_that_training_will_miss_is_refused_before_the_first_stage(tmp_path, tracking_settings):
+    settings = Settings(compare=CompareSettings(slots=1), train=TrainSettings(device="cuda"))
+    with pytest.raises(UserError, match=r"train\.device=cuda asks for a GPU"):
         demo(tmp_path / "demo", settings, ALONE, open_tracker(tracking_settings))
     assert not (tmp_path / "demo").exists()
 

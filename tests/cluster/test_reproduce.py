@@ -18,6 +18,7 @@ from cluster.reproduce import reproduce
 from cluster.reproduction import resolved
 from cluster.reproduction_report import publish, table
 from cluster.results import RunKey, append
+from cluster.session import Session
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
 from svaedc.claims import Claim
@@ -192,6 +193,20 @@ def made(folder):
     reproduction = plan_of(TINY, folder)
     reproduction.results.mkdir(parents=True)
     return reproduction
+
+
+def test_processes_that_training_will_have_no_room_for_are_refused_as_training_does(
+    tmp_path, tracking_settings, few_episodes
+):
+    alone = Session("127.0.0.1:1", is_local=True, cpus=1)
+    train = TrainSettings(workers=3, least_workers=2)
+    with pytest.raises(UserError, match="this needs 2 CPUs at the same time, for 2 processes of 1"):
+        reproduce(
+            plan_of(TINY, tmp_path, dataset=few_episodes),
+            Settings(compare=CompareSettings(slots=1), train=train),
+            alone,
+            open_tracker(tracking_settings),
+        )
 
 
 @pytest.mark.slow

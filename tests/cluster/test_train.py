@@ -14,7 +14,7 @@ import torch
 from cluster.config import TrackingSettings, TrainSettings
 from cluster.errors import UsageError, UserError
 from cluster.tracking import open_tracker
-from cluster.train import train
+from cluster.train import train, working_in
 from cluster.training_record import judge
 from svaedc import checkpoint
 
@@ -113,6 +113,7 @@ def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     assert {f"held_out/{name}" for name in while_it_trains} <= run.data.metrics.keys()
     assert run.data.metrics["train/trajectories_per_second"] > 0.0
     assert run.data.metrics["train/learning_rate"] > 0.0
+    assert (run.data.params["stride"], run.data.params["updates"]) == ("5", "40")
     capsys.readouterr()
     assert run_train() == path
     assert "nothing to do" in capsys.readouterr().err
@@ -183,9 +184,31 @@ def test_the_choices_of_a_preset_can_be_changed_and_belong_to_the_model_s_origin
         run_train(updates=3)
 
 
-def test_a_gpu_that_nobody_has_is_refused(run_train):
+def test_a_gpu_that_nobody_has_is_refused_before_anything_is_decoded_or_tracked(
+    run_train, tracking_settings, tmp_path
+):
     with pytest.raises(UserError, match=r"train\.device=cuda asks for a GPU and Ray finds none"):
-        run_train(device="cuda")
+        run_train(device="cuda", cache=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
+    assert open_tracker(tracking_settings).client.search_runs(["1"]) == []
+
+
+def test_a_training_that_has_no_room_to_go_on_is_tracked_by_no_new_run(
+    run_train, half_way, tracking_settings
+):
+    with pytest.raises(UserError, match="needs 8 CPUs"):
+        run_train(workers=2, threads=4)
+    assert half_way.exists()
+    assert open_tracker(tracking_settings).client.search_runs(["1"]) == []
+
+
+def test_two_trainings_at_once_in_one_folder_are_refused(run_train, finished):
+    with (
+        working_in(finished.parent),
+        pytest.raises(UserError, match=r"another training is at work in .*/model; wait for its end"),
+    ):
+        run_train()
+    assert run_train() == finished
 
 
 @pytest.mark.slow

@@ -7,8 +7,10 @@ import pytest
 import torch
 
 from svaedc.diagnostics import collapse, evaluate
+from svaedc.model import initialised
 
-GOOD = {"active_share": 1.0, "rec_norm": 0.5, "gen_norm": 0.6, "corr_y_rec": 0.99}
+GOOD = {"active_share": 1.0, "rec_norm": 0.5, "gen_norm": 0.6, "corr_y_rec": 0.99, "mae_y_rec": 0.01}
+ABOUT_Y = ("corr_y_rec", "mae_y_rec")
 
 
 @pytest.fixture
@@ -115,11 +117,31 @@ def test_a_dimension_that_never_moves_is_left_out_of_the_errors(model, halves):
     assert np.isfinite(evaluate(model, replace(held_out, xi=xi))["gen_norm"])
 
 
-def test_without_any_bad_step_the_correlation_is_undefined_and_no_collapse(model, halves):
+def test_a_y_that_does_not_vary_is_no_badness_to_learn_and_is_said_with_a_remedy(model, halves):
     held_out = replace(halves[1], y=np.zeros_like(halves[1].y))
     metrics = evaluate(model, held_out)
     assert np.isnan(metrics["corr_y_gen"])
-    assert collapse(GOOD | {"corr_y_rec": metrics["corr_y_rec"]}) is None
+    found = collapse(GOOD | {name: metrics[name] for name in ABOUT_Y}) or ""
+    assert "y, which is the same in all held-out episodes: use another G_bad" in found
+    assert "model=svae" in found
+
+
+def test_no_badness_is_asked_of_a_model_without_psi(small_config, halves, bounds):
+    model = initialised(replace(small_config, psi_dim=0), halves[0], bounds, seed=0)
+    metrics = evaluate(model, halves[1])
+    assert collapse(GOOD | {name: metrics[name] for name in ABOUT_Y}) is None
+
+
+@pytest.mark.parametrize("name", ["rec_norm", "gen_norm"])
+def test_an_error_that_is_not_a_number_is_a_collapse(name):
+    assert f"{name} is not a number; its weights are no longer finite" in (
+        collapse(GOOD | {name: float("nan")}) or ""
+    )
+
+
+def test_weights_that_are_not_finite_are_a_collapse(model, halves):
+    torch.nn.init.constant_(model.decoder.coefficients.bias, float("nan"))
+    assert "rec_norm is not a number" in (collapse(evaluate(model, halves[1])) or "")
 
 
 @pytest.mark.parametrize(

@@ -27,16 +27,15 @@ def test_a_read_only_memory_map_is_gathered_like_an_array(episodes, tmp_path):
     torch.testing.assert_close(mapped.gather(positions, CPU), episodes.gather(positions, CPU))
 
 
-def test_every_tenth_episode_is_held_out_by_its_number(episodes):
-    numbers = np.arange(1_000, 1_600)
-    training, held_out = split(episodes, numbers)
-    assert (numbers[held_out.rows] % 10 == 9).all()
-    assert len(held_out) == 60
-    assert sorted([*training.rows, *held_out.rows]) == list(range(600))
+def test_the_rows_that_are_held_out_are_not_trained_on_and_all_others_are(episodes):
+    selection = replace(episodes, rows=np.arange(100, 600))
+    training, held_out = split(selection, np.array([599, 100, 250]))
+    assert held_out.rows.tolist() == [100, 250, 599]
+    assert sorted([*training.rows, *held_out.rows]) == list(range(100, 600))
 
 
 def test_a_sample_is_part_of_the_selection_without_repetition(episodes):
-    _, held_out = split(episodes, np.arange(600))
+    _, held_out = split(episodes, np.arange(9, 600, 10))
     sample = held_out.sample(20, np.random.default_rng(0))
     assert len(set(sample.rows)) == 20
     assert set(sample.rows) <= set(held_out.rows)
@@ -53,6 +52,6 @@ def test_rows_outside_the_arrays_are_refused(episodes):
         replace(episodes, rows=np.array([3, 600]))
 
 
-def test_numbers_that_do_not_fit_the_selection_are_refused(episodes):
-    with pytest.raises(ValueError, match="600 episodes need as many numbers, got 3"):
-        split(episodes, np.arange(3))
+def test_held_out_rows_outside_the_selection_are_refused(episodes):
+    with pytest.raises(ValueError, match="must be rows of the selection, got 599; take them from the same"):
+        split(replace(episodes, rows=np.arange(599)), np.arange(9, 600, 10))

@@ -34,8 +34,6 @@ def test_trial_without_objective_is_tried_but_teaches_nothing():
     after = history().append(np.array([0.1, 0.2]), float("nan"))
     assert len(after) == 3
     np.testing.assert_array_equal(after.failed, [[0.1, 0.2]])
-    assert after.has_failed(np.array([0.1, 0.2]))
-    assert not after.has_failed(after.x[0])
     np.testing.assert_array_equal(after.tried, np.concatenate([after.x, [[0.1, 0.2]]]))
 
 

@@ -36,7 +36,7 @@ try:
     np.array(arrays[1])
 except MemoryError:
     print("too large for memory")
-halves = split(Episodes(*arrays, np.arange(count)), np.arange(count))
+halves = split(Episodes(*arrays, np.arange(count)), np.arange(9, count, 10))
 config = ModelConfig(4, observations, steps, channels=(4,), rank=8, prior_hidden=(8,), badness_hidden=(8,))
 model = initialised(config, halves[0], ([0.0] * observations, [1.0] * observations), seed=0)
 joint = StageSettings(10, "adam", "cosine", 1e-3, 0.0, 0.0, 1.0)

@@ -86,6 +86,13 @@ def test_values_that_are_not_finite_have_no_stratum():
         Balanced(np.array([0.0, np.nan], np.float32))
 
 
+@pytest.mark.parametrize("count", [3, 5])
+def test_a_pass_over_another_number_of_episodes_than_there_are_values_is_refused(count):
+    order = Balanced(np.array([0.0, 0.5, 0.5, 1.0], np.float32))
+    with pytest.raises(ValueError, match=f"sampling of {count} episodes needs as many values, got 4"):
+        next(batches(count, 2, ALONE, SEED, range(1), order))
+
+
 def test_a_rank_outside_the_world_is_refused():
     with pytest.raises(ValueError, match="got rank 2 of 2"):
         Shard(2, 2)

@@ -62,3 +62,11 @@ def test_an_unknown_name_or_value_names_the_nearest():
 def test_a_number_out_of_its_range_is_refused():
     with pytest.raises(ValueError, match=r"kl=-1\.0"):
         varied(preset("compact")(SIZES), {"kl_weight": -1.0})
+
+
+def test_changes_count_the_same_in_whatever_order_they_are_written():
+    made = preset("compact")(SIZES)
+    forwards = varied(made, CHANGES)
+    assert varied(made, dict(reversed(CHANGES.items()))) == forwards
+    assert varied(made, {"kl_weight": 3.0, "weighting": "balanced"}).training.weighting.kl == 3.0
+    assert forwards.training.weighting.y == 100.0

@@ -122,7 +122,7 @@ def test_the_report_tells_stopped_episodes_from_diverged_ones(tmp_path):
     report = collect_shard(setup, dataset, Shard(0, 4))
     assert dataset.read(Shard(0, 4)).stop == ("at once", "at once", "diverged", "at once")
     assert (report.diverged, report.stopped) == (1, 3)
-    assert dataset.sane_episodes() == 3
+    assert dataset.sane_episodes(Shard(0, 4)) == 3
     assert [found for _, found in verify(dataset)] == [[]]
 
 

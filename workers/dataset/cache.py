@@ -1,27 +1,25 @@
 """The training cache: a dataset decoded once into memory-mapped arrays, at the stride of training."""
 
 import errno
-import json
 import math
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32, Int64
+from jaxtyping import Bool, Float32, Int64
 
+from workers.dataset.cache_files import Layout, finish, is_finished, make, opened
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location
 from workers.dataset.publication import is_dead, writer
 from workers.dataset.schema import Columns
+from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, degrees, sampled
 
-_READY = "cache.json"
-_ARRAYS = ("episode", "x", "xi", "bad", "y", "f")
-
-Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
+_CHANGED = "{} was changed while it was decoded; let whatever repairs or replaces it end, and run this again"
 
 
 @dataclass(frozen=True)
@@ -52,37 +50,45 @@ class TrainingCache:
         """The number of each row's controller; rows with the same number have the same x."""
         return np.asarray(self.episode) // self.repeats
 
-    def held_out(self) -> np.ndarray:
+    def held_out(self) -> Int64[np.ndarray, " held_out"]:
         """Rows kept from training: those of every tenth controller, however far the data grows."""
-        return np.flatnonzero(self.controller() % 10 == 9)
+        return np.flatnonzero(self._is_held_out())
 
-    def training(self) -> np.ndarray:
-        """Rows to train on."""
-        return np.flatnonzero(self.controller() % 10 != 9)
+    def training(self) -> Int64[np.ndarray, " training"]:
+        """Rows to train on: all others."""
+        return np.flatnonzero(~self._is_held_out())
+
+    def _is_held_out(self) -> Bool[np.ndarray, " n"]:
+        return self.controller() % 10 == 9
 
 
 def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache:
     """Open the cache of a dataset at a stride below `parent`, decoding the dataset first if it must.
 
+    The folder is looked at once: what is decoded are the shards of the fingerprint that the cache is named
+    after, whatever arrives meanwhile.
+
     Raises:
-        ValueError: when the stride does not fit the horizon, or the dataset is empty, damaged, or holds
-            episodes twice or numbers that are not finite.
+        ValueError: when the stride does not fit the horizon, the dataset is empty, damaged, or holds files of
+            another, episodes twice or numbers that are not finite, or the cache is damaged.
         OSError: when the disk is too small; the error names both sizes.
     """
     if not 1 <= stride <= dataset.identity.horizon:
         raise ValueError(
             f"stride must lie between 1 and the horizon {dataset.identity.horizon}, got {stride}"
         )
-    folder = parent / f"{dataset.fingerprint()[:16]}-stride{stride}"
-    if not (folder / _READY).exists():
-        _build(dataset, stride, folder)
-    arrays = {name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in _ARRAYS}
+    shards = dataset.disjoint()
+    fingerprint = dataset.fingerprint_of(shards)
+    folder = parent / f"{fingerprint[:16]}-stride{stride}"
+    if not is_finished(folder):
+        _build(dataset, shards, fingerprint, stride, folder)
+    arrays = opened(folder, lambda count: _layout(dataset.identity, stride, count))
     return TrainingCache(dataset.identity.repeats, **arrays)
 
 
-def _build(dataset: Dataset, stride: int, folder: Path) -> None:
-    dataset.require_disjoint()
-    count = dataset.sane_episodes()
+def _build(dataset: Dataset, shards: Sequence[Shard], fingerprint: str, stride: int, folder: Path) -> None:
+    sane = {shard: dataset.sane_episodes(shard) for shard in shards}
+    count = sum(sane.values())
     if count == 0:
         raise ValueError(f"{dataset.folder} holds no episodes to train on; collect some first")
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -93,8 +99,10 @@ def _build(dataset: Dataset, stride: int, folder: Path) -> None:
     building = folder.with_name(f"{folder.name}.{writer()}")
     building.mkdir(exist_ok=True)
     try:
-        _decode(dataset, stride, layout, building)
-        (building / _READY).write_text(json.dumps({"episodes": count, "stride": stride}) + "\n")
+        _decode(dataset, sane, stride, make(building, layout))
+        if dataset.fingerprint_of(shards) != fingerprint:
+            raise ValueError(_CHANGED.format(dataset.folder))
+        finish(building, layout, {"episodes": count, "stride": stride})
         _move_into_place(building, folder)
     finally:
         shutil.rmtree(building, ignore_errors=True)
@@ -126,7 +134,7 @@ def _move_into_place(building: Path, folder: Path) -> None:
     try:
         building.rename(folder)
     except OSError:
-        if not (folder / _READY).exists():
+        if not is_finished(folder):
             raise
 
 
@@ -143,16 +151,16 @@ def _layout(identity: Identity, stride: int, count: int) -> Layout:
     }
 
 
-def _decode(dataset: Dataset, stride: int, layout: Layout, folder: Path) -> None:
-    arrays = {
-        name: np.lib.format.open_memmap(folder / f"{name}.npy", mode="w+", dtype=kind, shape=shape)
-        for name, (kind, shape) in layout.items()
-    }
+def _decode(
+    dataset: Dataset, sane: Mapping[Shard, int], stride: int, arrays: Mapping[str, np.memmap]
+) -> None:
+    """Fill the arrays with the sane episodes of the shards, of each as many as were counted."""
     filled = 0
-    for shard, columns in dataset.batches():
-        rows = _sampled(columns, sampled(dataset.identity.horizon, stride))
+    for shard, size in sane.items():
+        rows = _sampled(dataset.read(shard), sampled(dataset.identity.horizon, stride))
+        if len(rows["episode"]) != size:
+            raise ValueError(_CHANGED.format(dataset.path(shard)))
         _require_finite(rows, dataset.path(shard))
-        size = len(rows["episode"])
         for name, values in rows.items():
             arrays[name][filled : filled + size] = values
         filled += size
@@ -175,7 +183,7 @@ def _sampled(columns: Columns, steps: slice) -> dict[str, np.ndarray]:
 def _require_finite(rows: Mapping[str, np.ndarray], path: Location) -> None:
     """Refuse what would turn the model's every weight into NaN many updates later."""
     for name in ("x", "xi", "bad", "y", "f"):
-        strange = ~np.isfinite(rows[name]).reshape(len(rows[name]), -1).all(axis=1)
+        strange = ~np.isfinite(rows[name]).all(axis=tuple(range(1, rows[name].ndim)))
         if strange.any():
             raise ValueError(
                 f"{path.name} holds NaN or infinity in {name} of episode {rows['episode'][strange][0]}, "

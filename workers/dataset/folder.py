@@ -1,15 +1,18 @@
 """A dataset: shards in one place that share one identity."""
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Int64
 
 from workers.dataset import shards
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location, fetched
 from workers.dataset.manifest import MANIFEST, begun, manifest_text
-from workers.dataset.schema import Columns, read, read_stops
+from workers.dataset.schema import Columns, Outcomes, read, read_outcomes, read_stops
 from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, Episode
 
@@ -25,17 +28,19 @@ class Dataset:
         """The finished shards, in order."""
         return shards.present(self.folder)
 
-    def require_disjoint(self) -> None:
-        """Refuse a dataset that holds episodes twice, as two runs for different totals at once may leave it.
+    def disjoint(self) -> list[Shard]:
+        """The finished shards, in order, of a dataset that holds no episode twice.
 
         Raises:
-            ValueError: naming two shards that overlap.
+            ValueError: two shards overlap, as two runs for different totals at once may leave them.
         """
-        for one, next_one in pairwise(self.shards()):
+        found = self.shards()
+        for one, next_one in pairwise(found):
             if next_one.start < one.stop:
                 raise ValueError(
                     f"{one.name} and {next_one.name} in {self.folder} overlap; remove one of them"
                 )
+        return found
 
     def missing(self, episodes: int) -> list[Shard]:
         """The shards still to be collected for that many episodes."""
@@ -45,10 +50,10 @@ class Dataset:
         """How many episodes the finished shards hold."""
         return sum(shard.episodes for shard in self.shards())
 
-    def sane_episodes(self) -> int:
-        """How many of them a model may learn from: all but the diverged ones."""
-        stops = (read_stops(self.path(shard), self.identity) for shard in self.shards())
-        return self.episodes() - sum(each.count(DIVERGED) for each in stops)
+    def sane_episodes(self, shard: Shard) -> int:
+        """How many episodes of a shard a model may learn from: all but the diverged ones."""
+        stops = read_stops(self.path(shard), self.identity)
+        return len(stops) - stops.count(DIVERGED)
 
     def size(self) -> int:
         """Bytes of the finished shards."""
@@ -60,8 +65,29 @@ class Dataset:
         return self.folder / shard.name
 
     def read(self, shard: Shard) -> Columns:
-        """The episodes of a shard; a damaged file raises `ValueError`."""
-        return read(fetched(self.path(shard)), self.identity)
+        """The episodes of a shard.
+
+        Raises:
+            ValueError: its file is damaged, of another dataset, or holds other episodes than its name says.
+        """
+        columns = read(fetched(self.path(shard)), self.identity)
+        self._require_rows(shard, columns.episode)
+        return columns
+
+    def outcomes(self, shard: Shard) -> Outcomes:
+        """How the episodes of a shard went; raises as `read` does."""
+        outcomes = read_outcomes(self.path(shard), self.identity)
+        self._require_rows(shard, outcomes.episode)
+        return outcomes
+
+    def _require_rows(self, shard: Shard, episode: Int64[np.ndarray, " n"]) -> None:
+        if not np.array_equal(episode, np.arange(shard.start, shard.stop)):
+            held = f"{episode[0]} to {episode[-1]}" if len(episode) else "none"
+            raise ValueError(
+                f"{self.path(shard)} must hold the episodes {shard.start} to {shard.stop - 1} of its name, "
+                f"got {held}; was it renamed? `svaedc dataset verify {self.folder}` names every such file, "
+                "`svaedc dataset repair` recomputes them"
+            )
 
     def episode(self, index: int) -> Episode:
         """One episode, as it was recorded.
@@ -78,8 +104,11 @@ class Dataset:
 
     def fingerprint(self) -> str:
         """SHA-256 over the identity and the recorded digest of every shard: the same for the same bytes."""
+        return self.fingerprint_of(self.shards())
+
+    def fingerprint_of(self, present: Sequence[Shard]) -> str:
+        """The same, if these were all shards there are: of one look at a folder that may be growing."""
         digest = hashlib.sha256(self.identity.digest.encode())
-        present = self.shards()
         for shard, recorded in zip(present, shards.recorded_digests(self.folder, present), strict=True):
             digest.update(f"{shard.name} {recorded}\n".encode())
         return digest.hexdigest()

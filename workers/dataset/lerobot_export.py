@@ -35,11 +35,12 @@ def export_lerobot(dataset: Dataset, out: Path) -> Iterator[Shard]:
     Raises:
         ValueError: a shard is damaged, or two overlap.
     """
-    dataset.require_disjoint()
+    shards = dataset.disjoint()
     task = f"{dataset.identity.setup}: {', '.join(dataset.identity.conditions)} are bad"
     moments = {"observation.state": Moments(), "bad": Moments(), "timestamp": Moments()}
     first = 0
-    for number, (shard, columns) in enumerate(dataset.batches()):
+    for number, shard in enumerate(shards):
+        columns = dataset.read(shard)
         place = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
         frames = _frames(columns, dataset.identity, first)
         _write(frames, out / _DATA_PATH.format(**place), dataset.identity.horizon)

@@ -24,11 +24,11 @@ def export_npz(dataset: Dataset, out: Path) -> Iterator[Shard]:
     Raises:
         ValueError: a shard is damaged, or two overlap.
     """
-    dataset.require_disjoint()
+    shards = dataset.disjoint()
     (out / MANIFEST).write_text(manifest_text(dataset.identity))
     names = _names(dataset.identity)
-    for shard, columns in dataset.batches():
-        arrays = _arrays(columns, dataset.identity)
+    for shard in shards:
+        arrays = _arrays(dataset.read(shard), dataset.identity)
         np.savez(out / f"{Path(shard.name).stem}.npz", allow_pickle=False, **arrays, **names)
         yield shard
 

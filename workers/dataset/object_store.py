@@ -17,7 +17,8 @@ OPTIONS = ("endpoint_override", "region", "scheme")
 
 Options = tuple[tuple[str, str], ...]
 
-_GONE = "AWS Error NO_SUCH_KEY"
+_GONE = re.compile(r"AWS Error (NO_SUCH_KEY|RESOURCE_NOT_FOUND during (Get|Head)Object)")
+"""An answer without a body, as to an object that is removed while it is sent, does not name the key."""
 _REFUSED = "ACCESS_DENIED|INVALID_ACCESS_KEY|SIGNATURE|TOKEN|AUTHENTICATION|CREDENTIAL|CLIENT|status 403"
 
 
@@ -39,7 +40,7 @@ def reaching(path: object) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if _GONE in str(error):
+        if _GONE.search(str(error)):
             raise FileNotFoundError(errno.ENOENT, "no such object", str(path)) from error
         refused = refusal(path, error)
         if refused is None:
@@ -51,7 +52,7 @@ def refusal(path: object, error: Exception) -> StoreError | None:
     """What an error says about the store; None if it is about something else."""
     if isinstance(error, StoreError):
         return StoreError(error.errno, error.strerror)
-    is_of_store = "AWS Error" in str(error) and _GONE not in str(error)
+    is_of_store = "AWS Error" in str(error) and not _GONE.search(str(error))
     return StoreError(*_explained(path, str(error))) if is_of_store else None
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from workers.dataset.folder import Dataset
-from workers.dataset.schema import read_outcomes
 from workers.rollout import DIVERGED
 
 TRAJECTORIES = 1_000
@@ -39,14 +38,13 @@ def irreducible(dataset: Dataset) -> Irreducible | None:
     """The irreducible part of a dataset with repeats; None when it has fewer than two whole controllers.
 
     Raises:
-        ValueError: a file is damaged, or the dataset has no repeats.
+        ValueError: a file is damaged or not the dataset's, or the dataset has no repeats.
     """
     repeats = dataset.identity.repeats
     if repeats < 2:
         raise ValueError(f"{dataset.folder} must hold repeats of its controllers, got repeats = {repeats}")
-    shards = dataset.shards()
-    parts = [read_outcomes(dataset.path(shard), dataset.identity) for shard in shards]
-    episode = [index for shard in shards for index in range(shard.start, shard.stop)]
+    parts = [dataset.outcomes(shard) for shard in dataset.shards()]
+    episode = [index for part in parts for index in part.episode.tolist()]
     rows = _whole(episode, [stop for part in parts for stop in part.stop], repeats)
     if len(rows) < 2:
         return None

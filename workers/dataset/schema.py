@@ -16,6 +16,7 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location, source
 from workers.dataset.object_store import refusal
+from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_in, require_own
 from workers.dataset.quantisation import described, restored, stored
 from workers.rollout import Episode
 
@@ -34,12 +35,14 @@ class Outcomes:
     """How episodes went, without their trajectories, in the order of the file.
 
     Attributes:
+        episode: indices.
         bad: bits of the bad conditions per step, or degrees of a graded G_bad.
         y: badness.
         f: objective.
         stop: stop reason of each, "" for none.
     """
 
+    episode: Int64[np.ndarray, " n"]
     bad: Bad
     y: Float32[np.ndarray, " n"]
     f: Float32[np.ndarray, " n"]
@@ -88,8 +91,8 @@ def schema(identity: Identity) -> pa.Schema:
     size = len(identity.observation) * identity.horizon
     physics = pa.struct([pa.field(name, pa.float64(), nullable=False) for name in sorted(identity.physics)])
     metadata = {
-        "svaedc.identity": identity.to_json(),
-        "svaedc.digest": identity.digest,
+        IDENTITY_TEXT: identity.to_json(),
+        IDENTITY_DIGEST: identity.digest,
         "svaedc.layout": json.dumps(
             {
                 "xi": ["observation", "time"],
@@ -177,16 +180,14 @@ def read_identity(path: Location) -> Identity:
     """
     with _damage_named(path):
         metadata = pq.read_schema(source(path)).metadata or {}
-    if b"svaedc.identity" not in metadata:
-        raise ValueError(f"{path} holds no episodes of this project: its metadata lacks svaedc.identity")
-    return Identity.from_json(metadata[b"svaedc.identity"].decode())
+    return identity_in(path, metadata)
 
 
 def read(path: Location, identity: Identity) -> Columns:
     """The episodes of a file, every page checked against its checksum.
 
     Raises:
-        ValueError: when the file is damaged or not of this schema.
+        ValueError: when the file is damaged, of another dataset, or not of this schema.
     """
     table = _table(path, identity, schema(identity).names)
     shape = (len(identity.observation), identity.horizon)
@@ -206,10 +207,11 @@ def read_outcomes(path: Location, identity: Identity) -> Outcomes:
     """How the episodes of a file went; the large columns are not read.
 
     Raises:
-        ValueError: when a part that is read is damaged, or the file is not of this schema.
+        ValueError: when a part that is read is damaged, or the file is of another dataset or schema.
     """
-    table = _table(path, identity, ["bad", "y", "f", "stop"])
+    table = _table(path, identity, ["episode", "bad", "y", "f", "stop"])
     return Outcomes(
+        episode=table["episode"].to_numpy(),
         bad=_dense(table["bad"], (identity.horizon,)),
         y=table["y"].to_numpy(),
         f=table["f"].to_numpy(),
@@ -218,20 +220,17 @@ def read_outcomes(path: Location, identity: Identity) -> Outcomes:
 
 
 def _table(path: Location, identity: Identity, names: list[str]) -> pa.Table:
-    """Columns of a file, every page of them checked against its checksum."""
+    """Columns of a file of this dataset, every page of them checked against its checksum."""
     with _damage_named(path):
         file = pq.ParquetFile(source(path), page_checksum_verification=True, pre_buffer=True)
+        require_own(path, file.schema_arrow.metadata or {}, identity)
         if not file.schema_arrow.equals(schema(identity)):
             raise ValueError(f"{path} has other columns than schema version {identity.schema_version}")
         return file.read(columns=names)
 
 
 def read_stops(path: Location, identity: Identity) -> tuple[str, ...]:
-    """The stop reasons of a file's episodes, without reading the rest.
-
-    Raises:
-        ValueError: as `read_outcomes` does.
-    """
+    """The stop reasons of a file's episodes, without reading the rest; raises as `read_outcomes` does."""
     return tuple(_table(path, identity, ["stop"])["stop"].to_pylist())
 
 

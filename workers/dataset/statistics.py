@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
-from workers.dataset.schema import Bad, read_outcomes
+from workers.dataset.schema import Bad
 from workers.rollout import DIVERGED
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -38,12 +38,12 @@ def statistics(dataset: Dataset) -> Statistics:
     """Describe the episodes of a dataset, without reading their trajectories.
 
     Raises:
-        ValueError: the dataset has no episodes, or a damaged file.
+        ValueError: the dataset has no episodes, or a file that is damaged or not its own.
     """
     objectives, badness, steps, stops = [], 0.0, 0, Counter[str]()
     bad = np.zeros(len(dataset.identity.conditions))
     for shard in dataset.shards():
-        outcomes = read_outcomes(dataset.path(shard), dataset.identity)
+        outcomes = dataset.outcomes(shard)
         objectives.append(outcomes.f)
         badness += float(outcomes.y.sum(dtype=np.float64))
         stops.update(outcomes.stop)

@@ -6,7 +6,9 @@ from workers.environments import yumi
 from workers.setups import Setup
 from workers.tasks.stop import HandGuard
 
-SHARE = 0.2  # of the arm's joint speeds, at which the authors' robot could be run
+# Of the arm's joint speeds: a reading of the paper's "1/5". The authors' code notes 0.1 for the robot, at
+# which next to nothing is pushed (docs/yumi.md).
+SHARE = 0.2
 LOWEST_HAND = 0.09  # m; lower, the gripper is about to hit the table
 
 

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from tempfile import NamedTemporaryFile
 
-import pybullet
-
+from workers.simulation.bullet import pybullet
 from workers.simulation.world import World
 
 Vector = tuple[float, ...]

@@ -1,6 +1,8 @@
 """What a task is: which steps are bad, and what the episode was worth."""
 
+import math
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -10,13 +12,16 @@ from workers.environments.environment import Observed
 Bad = Bool[np.ndarray, "conditions time"] | Float32[np.ndarray, "1 time"]
 """What G_bad says of every step: which conditions hold, or, of a graded one, the degree in [0, 1]."""
 
+BITS = 8
+"""A step has so many bits in a dataset: at most so many bad conditions, `stopped` included."""
+
 
 class Task(ABC):
     """Bad conditions and an objective over the T steps of an episode.
 
     Class attributes of a concrete task:
         conditions: names of the bad conditions, at most 7, for a step has 8 bits in the dataset and one
-            may be `stopped`.
+            may be `stopped`; of a graded G_bad one, the name of its degree.
         graded: whether G_bad is one row of degrees instead of one row of booleans per condition.
         bad_name: how a user's G_bad is imported; "" for the task's own.
         bad_digest: SHA-256 of the file that defines it; "" for the task's own.
@@ -38,3 +43,41 @@ class Task(ABC):
     def stopped_objective(self, observed: Observed, bad: Bad) -> float:
         """The objective of an episode that a stop rule ended: f of the steps it ran, which are `observed`."""
         return self.objective(observed, bad)
+
+
+def marked(task: Task, bad: Any, steps: int) -> Bad:
+    """What `is_bad` of a task returned for so many steps, if an episode can hold it.
+
+    Raises:
+        ValueError: it has another type or shape than it must, or degrees outside [0, 1].
+    """
+    rows, expected = np.asarray(bad), (len(task.conditions), steps)
+    kind, kinds = ("float32", "f") if task.graded else ("bool", "bui")
+    if rows.dtype.kind not in kinds or rows.shape != expected:
+        raise ValueError(
+            f"{type(task).__name__}.is_bad must return {kind} of shape {expected}, one row for each of "
+            f"{', '.join(task.conditions)} and one column per step, got {rows.dtype} of shape {rows.shape}; "
+            "make its rows and `conditions` agree"
+        )
+    if not task.graded:
+        return rows.astype(np.bool_, copy=False)
+    outside = np.flatnonzero(~((rows[0] >= 0) & (rows[0] <= 1)))
+    if outside.size:
+        raise ValueError(
+            f"{type(task).__name__}.is_bad must return degrees in [0, 1], got {rows[0, outside[0]]} in step "
+            f"{outside[0]}; scale them, or clip them with np.clip(values, 0, 1)"
+        )
+    return rows.astype(np.float32, copy=False)
+
+
+def require_objective(task: Task, f: float) -> None:
+    """Refuse an objective of a task that no dataset can hold.
+
+    Raises:
+        ValueError: it is not a finite number.
+    """
+    if not math.isfinite(f):
+        raise ValueError(
+            f"the objective of {type(task).__name__} must be a finite number, got {f}; return one "
+            "for every episode, the lower limit of f for one that is worth nothing"
+        )

@@ -1,8 +1,10 @@
 """The training cache against the dataset it was decoded from."""
 
+import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 from workers.dataset import schema, shards
 from workers.dataset.cache import require_space, training_cache
-from workers.dataset.folder import create
+from workers.dataset.folder import Dataset, create
 from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
 
@@ -32,14 +34,14 @@ def test_the_cache_is_the_dataset_at_its_stride(dataset, tmp_path, identity, epi
 
 def test_diverged_episodes_are_left_out(dataset, tmp_path):
     cache = training_cache(dataset, 5, tmp_path)
-    assert dataset.sane_episodes() == len(cache.episode) == 17
+    assert sum(map(dataset.sane_episodes, dataset.shards())) == len(cache.episode) == 17
     assert not set(cache.episode.tolist()) & {3, 10, 17}
 
 
 def test_stopped_episodes_may_be_learnt_from_and_diverged_ones_may_not(guarded, tmp_path):
     cache = training_cache(guarded, 5, tmp_path)
     assert cache.episode.tolist() == [index for index in range(16) if index not in (3, 10)]
-    assert guarded.sane_episodes() == 14
+    assert sum(map(guarded.sane_episodes, guarded.shards())) == 14
     stopped = np.isin(cache.episode, (1, 6, 11))
     assert np.all(cache.bad[stopped][:, 2:] == 1.0)  # steps 14 and 19 of 20, stopped at 11
     assert np.all(cache.xi[stopped][:, :, 2] == cache.xi[stopped][:, :, 3])
@@ -151,3 +153,78 @@ def test_numbers_that_are_not_finite_are_refused_by_shard_and_episode(tmp_path, 
     with pytest.raises(ValueError, match=r"-000000008\.parquet holds NaN or infinity in xi of episode 5"):
         training_cache(dataset, 5, tmp_path / "cache")
     assert list((tmp_path / "cache").iterdir()) == []
+
+
+def test_a_shard_of_diverged_episodes_adds_nothing(dataset, tmp_path, identity, episodes_of):
+    rows = [replace(row, stop="diverged") for row in episodes_of(identity, range(20, 24))]
+    shards.commit(dataset.folder, Shard(20, 24), lambda path: schema.write(path, identity, 20, rows))
+    assert training_cache(dataset, 5, tmp_path).episode.tolist() == SANE
+
+
+def test_shards_that_arrive_while_a_cache_is_built_are_left_to_the_next(dataset, tmp_path, fill):
+    class Growing(Dataset):
+        """A dataset that another process extends whenever somebody has looked at it."""
+
+        def shards(self):
+            found = super().shards()
+            fill(dataset, dataset.episodes() + 8)
+            return found
+
+    fingerprint = dataset.fingerprint()
+    cache = training_cache(Growing(dataset.folder, dataset.identity), 5, tmp_path / "cache")
+    assert dataset.episodes() > 20
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == [f"{fingerprint[:16]}-stride5"]
+    assert cache.episode.tolist() == SANE
+
+
+@pytest.mark.parametrize("change", [{"stop": "diverged"}, {"f": 7.0}])
+def test_a_shard_that_is_replaced_while_a_cache_is_built_is_refused_and_leaves_none(
+    dataset, tmp_path, identity, episodes_of, change
+):
+    class Changing(Dataset):
+        """A dataset whose second shard is replaced while the first is read."""
+
+        def read(self, shard):
+            rows = episodes_of(identity, range(8, 16))
+            rows[4] = replace(rows[4], **change)
+            dataset.path(Shard(8, 16)).unlink()
+            shards.commit(dataset.folder, Shard(8, 16), lambda path: schema.write(path, identity, 8, rows))
+            return super().read(shard)
+
+    with pytest.raises(ValueError, match=r"was changed while it was decoded; let whatever .* run this again"):
+        training_cache(Changing(dataset.folder, dataset.identity), 5, tmp_path / "cache")
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+def _spoilt(path, change) -> None:
+    path.write_bytes(change(path.read_bytes()))
+
+
+@pytest.mark.parametrize("name", ["episode", "x", "xi", "bad", "y", "f"])
+def test_a_flipped_bit_anywhere_in_a_cache_is_refused_with_the_folder_to_delete(dataset, tmp_path, name):
+    training_cache(dataset, 5, tmp_path)
+    (folder,) = tmp_path.glob("*-stride5")
+    _spoilt(folder / f"{name}.npy", lambda content: content[:-1] + bytes([content[-1] ^ 1]))
+    with pytest.raises(ValueError, match=rf"{folder} is damaged: the bytes of {name}\.npy are not .* delete"):
+        training_cache(dataset, 5, tmp_path)
+    shutil.rmtree(folder)
+    assert training_cache(dataset, 5, tmp_path).episode.tolist() == SANE
+
+
+@pytest.mark.parametrize("name", ["xi.npy", "cache.json"])
+def test_a_truncated_cache_is_refused_with_the_folder_to_delete(dataset, tmp_path, name):
+    training_cache(dataset, 5, tmp_path)
+    (folder,) = tmp_path.glob("*-stride5")
+    _spoilt(folder / name, lambda content: content[: len(content) // 2])
+    with pytest.raises(ValueError, match=f"{folder} is damaged: .*; delete that folder"):
+        training_cache(dataset, 5, tmp_path)
+
+
+def test_a_cache_from_before_there_were_checksums_is_held_to_its_shapes(dataset, tmp_path):
+    expected = np.array(training_cache(dataset, 5, tmp_path).xi)
+    (folder,) = tmp_path.glob("*-stride5")
+    (folder / "cache.json").write_text(json.dumps({"episodes": 17, "stride": 5}))
+    assert np.array_equal(training_cache(dataset, 5, tmp_path).xi, expected)
+    np.save(folder / "xi.npy", expected[:-1])
+    with pytest.raises(ValueError, match=r"xi\.npy must hold float32 \(17, 3, 4\), got float32 \(16, 3, 4\)"):
+        training_cache(dataset, 5, tmp_path)

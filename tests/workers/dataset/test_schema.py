@@ -87,9 +87,15 @@ def test_a_flipped_byte_in_the_data_is_refused_by_name(file, identity):
 
 
 def test_a_file_of_other_columns_is_refused(file, identity):
-    longer = replace(identity, horizon=40)
-    with pytest.raises(ValueError, match="other columns"):
-        schema.read(file, longer)
+    table = pq.read_table(file)
+    pq.write_table(table.set_column(4, "y", table["y"].cast("float64")), file)
+    with pytest.raises(ValueError, match="other columns than schema version 1"):
+        schema.read(file, identity)
+
+
+def test_a_file_of_another_dataset_is_refused_whatever_its_columns(file, identity):
+    with pytest.raises(ValueError, match=r"belongs to another dataset; .* differ in horizon: 20 and 40"):
+        schema.read(file, replace(identity, horizon=40))
 
 
 def test_a_parquet_file_from_elsewhere_is_refused(tmp_path):
