@@ -103,12 +103,12 @@ def _admitted(actor: Any, options: dict[str, Any], plan: Plan, deadline: float, 
     answer, notice = actor.enter.remote(plan), time.monotonic() + NOTICE_SECONDS
     while not ray.wait([answer], timeout=POLL_SECONDS)[0]:
         is_busy = has_a_place(actor)
-        if not is_busy and time.monotonic() >= deadline:
-            require_robot_host()
-            raise UserError(_no_place(_others(options)))
         if time.monotonic() >= notice:
             say(_at_work(plan) if is_busy else f"waiting for a place: {_no_place(_others(options))}")
             notice = inf
+        if not is_busy and time.monotonic() >= deadline:
+            require_robot_host()
+            raise UserError(_no_place(_others(options)))
     return ray.get(answer)
 
 
