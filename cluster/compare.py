@@ -124,13 +124,14 @@ def compare(
         grid.require_purpose(folder, seeds_in(folder))
         parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
         note = note_in(folder, tracker)
-        plan.require_length(dict(all_runs(folder)))
-        if _is_finished(plan, note):
+        runs = dict(all_runs(folder))
+        plan.require_length(runs)
+        if _is_finished(plan, note, runs):
             say(f"{folder} holds the whole comparison: nothing to do")
-            return Comparison(summary_of(plan.job, list(all_runs(folder))), Run(tracker, note.run).url)
+            return Comparison(summary_of(plan.job, setup, list(runs.items())), Run(tracker, note.run).url)
         tracked = begin(folder, tracker, f"compare {setup.name}", parameters)
         with tracked.run:
-            _submit(plan, tracked)
+            _submit(plan, tracked, runs)
             return Comparison(_record(plan, setup, tracked, parameters), tracked.run.url)
 
 
@@ -186,16 +187,14 @@ def usable(model: Path, setup: Setup) -> tuple[Path, str]:
     return found.path, str(found.metadata["setup"])
 
 
-def _is_finished(plan: _Plan, note: Note) -> bool:
+def _is_finished(plan: _Plan, note: Note, runs: Mapping[RunKey, Sequence[Trial]]) -> bool:
     """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
-    folder, runs = plan.job.folder, dict(all_runs(plan.job.folder))
     whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
-    return whole and all((folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
+    return whole and all((plan.job.folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
 
 
-def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
+def _submit(plan: _Plan, tracked: TrackedComparison, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
     folder, keys, length = plan.job.folder, plan.grid.keys(), plan.job.length
-    runs = dict(all_runs(folder))
     missing = plan.missing(runs)
     if not missing:
         return
@@ -213,7 +212,7 @@ def _submit(plan: _Plan, tracked: TrackedComparison) -> None:
 
 def _record(plan: _Plan, setup: Setup, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
     runs = list(all_runs(plan.job.folder))
-    summary = summary_of(plan.job, runs)
+    summary = summary_of(plan.job, setup, runs)
     settings = {**parameters, "MLflow run": tracked.run.url}
     report = publish(plan.job, setup, runs, summary, settings, plan.caption)
     for line in lines(summary):

@@ -1,18 +1,17 @@
 """The folder of a comparison: it holds one comparison, and one command at a time works in it."""
 
-import fcntl
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cluster import folder_lock
 from cluster.errors import UserError
 from cluster.files import replacing
 from cluster.results import RUNS
 
 IDENTITY = "comparison.json"
-LOCK = ".lock"
 
 
 @contextmanager
@@ -41,15 +40,10 @@ def alone_in(folder: Path) -> Iterator[None]:
     """
     with writing(folder):
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("w")
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UserError(
-                f"another comparison is at work in {folder}; wait for its end, "
-                "or choose another folder with --out"
-            ) from error
+    refusal = (
+        f"another comparison is at work in {folder}; wait for its end, or choose another folder with --out"
+    )
+    with folder_lock.alone_in(folder, refusal):
         yield
 
 

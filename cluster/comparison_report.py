@@ -16,7 +16,6 @@ from cluster.page import page
 from cluster.results import Runs, rows, write_table
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Summary
-from workers import setups
 from workers.hardware import robots
 from workers.randomness import generator
 from workers.setups import Setup
@@ -35,9 +34,9 @@ class Report:
     figures: tuple[Path, ...]
 
 
-def summary_of(job: ComparisonJob, runs: Runs) -> Summary:
+def summary_of(job: ComparisonJob, setup: Setup, runs: Runs) -> Summary:
     """Means, intervals and paired differences over all runs of the folder."""
-    reporting = Reporting(initial=job.initial, broken_below=setups.load(job.setup).broken)
+    reporting = Reporting(initial=job.initial, broken_below=setup.broken)
     return summarise(rows(runs), reporting, generator(0, "bootstrap", 0))
 
 

@@ -5,9 +5,11 @@ from typing import Annotated, Any
 
 import typer
 
+from cluster.config import Settings
 from cluster.errors import UsageError
 from cluster.options import Address, Config, Overrides, durable, durable_dataset, settings_of, usage_errors
 from cluster.services import services
+from workers.dataset.location import Location
 
 _SCALE_HELP = (
     "machine: what two cores collect in up to an hour; paper: 500,000 episodes and its own training."
@@ -67,10 +69,7 @@ def reproduce(
     from cluster.session import connect
 
     settings = settings_of(config, overrides)
-    if settings.train.latent != "preset":
-        raise UsageError("a figure's panels decide the size of the latent path: leave train.latent out")
-    if dataset is not None and episodes is not None:
-        raise UsageError("--episodes says how many to collect, --dataset is collected already: leave one out")
+    _require_consistent(settings, dataset, episodes)
     with usage_errors():
         recipe, size = recipes.recipe(figure), recipes.scale(scale)
     reproduction = resolved(
@@ -91,3 +90,10 @@ def reproduce(
         return
     with services(settings, address) as (session, tracker):
         run_reproduction(reproduction, settings, session, tracker)
+
+
+def _require_consistent(settings: Settings, dataset: Location | None, episodes: int | None) -> None:
+    if settings.train.latent != "preset":
+        raise UsageError("a figure's panels decide the size of the latent path: leave train.latent out")
+    if dataset is not None and episodes is not None:
+        raise UsageError("--episodes says how many to collect, --dataset is collected already: leave one out")

@@ -6,7 +6,7 @@ q(tau, psi|xi, y), which has seen the trajectory itself and so is an oracle, or 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -17,12 +17,13 @@ from jaxtyping import Float, Float32
 from matplotlib.figure import Figure
 from torch import Tensor
 
+from cluster.training_job import episodes
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source
 from svaedc import checkpoint, methods
 from svaedc.candidates import Problem
 from svaedc.comparison import trials
-from svaedc.episodes import Batch, Episodes, measured_over, split
+from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.features import LatentMeans, Latents
 from svaedc.intervals import Estimate, bootstrap
 from svaedc.model import SvaeDc
@@ -82,9 +83,8 @@ def compute(source: Source, model_path: Path, cell: Cell) -> Result:
 
 def candidates(cache: TrainingCache, count: int) -> Episodes:
     """The first held-out episodes."""
-    rows = np.arange(len(cache.episode))
-    _, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.held_out())
-    return Episodes(held_out.x, held_out.xi, held_out.bad, held_out.y, held_out.rows[:count])
+    _, held_out = episodes(cache)
+    return replace(held_out, rows=held_out.rows[:count])
 
 
 def codes(model: SvaeDc, chosen: Episodes, share: float) -> dict[str, Tensor]:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from cluster.training_job import episodes
 from svaedc.diagnostics import collapse, evaluate
-from svaedc.episodes import Episodes, split
+from svaedc.episodes import Episodes
 from svaedc.model import SvaeDc, initialised
 from svaedc.offline import Recorded, worth
 from svaedc.presets import Preset, Sizes, preset
@@ -48,8 +49,7 @@ class Source:
 
 def halves(cache: TrainingCache, count: int) -> tuple[Episodes, Episodes]:
     """The first `count` training episodes, so that larger selections hold the smaller; all held-out ones."""
-    rows = np.arange(len(cache.episode))
-    training, held_out = split(Episodes(cache.x, cache.xi, cache.bad, cache.y, rows), cache.held_out())
+    training, held_out = episodes(cache)
     if count > len(training):
         raise ValueError(f"there are {len(training)} training episodes, got a count of {count}; collect more")
     return replace(training, rows=training.rows[:count]), held_out

@@ -75,7 +75,7 @@ def test_a_run_goes_on_after_a_trial_without_an_objective_as_if_it_had_not_stopp
 
 def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(job):
     runs = list(all_runs(job.folder))
-    summary = summary_of(job, runs)
+    summary = summary_of(job, SETUP, runs)
     publish(job, SETUP, runs, summary, {})
     page = (job.folder / "report.html").read_text()
     assert "Some trials gave no objective. They teach no method anything" in page
