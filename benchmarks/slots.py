@@ -1,7 +1,7 @@
 """Simulated runs on Ray Tune against the same runs in plain processes: what a second slot brings.
 
-A plain process does one run after the other and nothing else. Trials are timed from the first that each
-worker ends, so that starting workers and importing PyTorch do not count; `with start` counts them too:
+A plain process does one run after the other and nothing else. Trials are timed from the first report of each
+worker, so that starting workers and importing PyTorch do not count; `with start` counts them too:
 
     python benchmarks/slots.py --runs 12 --rounds 2
 """
@@ -29,15 +29,28 @@ from workers import setups
 METHOD = "se"
 
 
+@dataclass(frozen=True, order=True)
+class Report:
+    """A worker has ended trials.
+
+    Attributes:
+        at: seconds of the monotonic clock.
+        trials: since its last report.
+    """
+
+    at: float
+    trials: int
+
+
 @dataclass
 class Clock(Watch):
-    """Notes when trials end."""
+    """Notes when workers report."""
 
-    ends: list[float] = field(default_factory=list)
+    reports: list[Report] = field(default_factory=list)
 
-    def on_trial_result(self, *_: Any, **__: Any) -> None:
-        """A trial ended."""
-        self.ends.append(time.monotonic())
+    def on_trial_result(self, *_: Any, result: dict[str, Any], **__: Any) -> None:
+        """Trials ended."""
+        self.reports.append(Report(time.monotonic(), result.get("trials", 0)))
 
 
 @dataclass(frozen=True)
@@ -48,10 +61,12 @@ class Rates:
     with_start: float
 
     @classmethod
-    def of(cls, begin: float, ends: list[float], workers: int) -> "Rates":
-        """The first trial of each worker begins the clock and so is not counted."""
-        ends = sorted(ends)
-        return cls((len(ends) - workers) / (ends[-1] - ends[workers - 1]), len(ends) / (ends[-1] - begin))
+    def of(cls, begin: float, reports: list[Report], workers: int) -> "Rates":
+        """The first report of each worker begins the clock, so its trials are not counted."""
+        first, later = sorted(reports)[:workers], sorted(reports)[workers:]
+        known, end = sum(each.trials for each in later), later[-1].at
+        of_first = sum(each.trials for each in first)
+        return cls(known / (end - first[-1].at), (known + of_first) / (end - begin))
 
 
 def on_tune(job: ComparisonJob, keys: list[RunKey], slots: int) -> Rates:
@@ -61,25 +76,25 @@ def on_tune(job: ComparisonJob, keys: list[RunKey], slots: int) -> Rates:
         clock = Clock(progress, Standing((METHOD,)), lambda _: None)
         begin = time.monotonic()
         submit(job, keys, slots, clock)
-        return Rates.of(begin, clock.ends, slots)
+        return Rates.of(begin, clock.reports, slots)
 
 
-def one_after_the_other(job: ComparisonJob, keys: list[RunKey]) -> list[float]:
-    """Runs in this process; when each trial ended."""
+def one_after_the_other(job: ComparisonJob, keys: list[RunKey]) -> list[Report]:
+    """Runs in this process, with a report of each trial."""
     torch.set_num_threads(1)
-    setup, ends = setups.load(job.setup), []
+    setup, reports = setups.load(job.setup), []
     with setup.open() as environment:
         for key in keys:
-            ends += [time.monotonic() for _ in job.run(key, setup, environment)]
-    return ends
+            reports += [Report(time.monotonic(), 1) for _ in job.run(key, setup, environment)]
+    return reports
 
 
 def plain(job: ComparisonJob, keys: list[RunKey], processes: int) -> Rates:
     """The runs dealt out to processes that know nothing of each other."""
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
         begin = time.monotonic()
-        ends = pool.starmap(one_after_the_other, [(job, keys[i::processes]) for i in range(processes)])
-        return Rates.of(begin, [end for each in ends for end in each], processes)
+        reports = pool.starmap(one_after_the_other, [(job, keys[i::processes]) for i in range(processes)])
+        return Rates.of(begin, [report for each in reports for report in each], processes)
 
 
 WAYS: dict[str, Callable[[ComparisonJob, list[RunKey]], Rates]] = {

@@ -69,11 +69,11 @@ class Watch(Callback):
         result: dict[str, Any],
         **_: Any,
     ) -> None:
-        """A trial ended."""
+        """A run has made trials."""
         self.disk = self.disk or result.get("disk", "")
-        if "trial" in result:
+        if "trials" in result:
             self.standing.best[RunKey(**trial.config["run"])] = result["best"]
-            self.progress.advance(1, f"best so far: {self.standing}")
+            self.progress.advance(result["trials"], f"best so far: {self.standing}")
 
     def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
         """A run ended."""
