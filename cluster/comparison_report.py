@@ -62,7 +62,7 @@ def publish(
         UserError: the disk is full.
     """
     path = job.folder / SUMMARY
-    title = _title(job, caption)
+    title = _title(job, setup, caption)
     with writing(job.folder):
         table = write_table(job.folder, runs, setup=job.setup, gap=job.gap)
         with replacing(path) as unfinished:
@@ -81,11 +81,12 @@ def publish(
     return Report((table, path, job.folder / PAGE), drawn)
 
 
-def _title(job: ComparisonJob, caption: str) -> str:
-    """What was compared; a stand-in for hardware is called one."""
+def _title(job: ComparisonJob, setup: Setup, caption: str) -> str:
+    """What was compared; a stand-in for hardware is called one, and a formula has no physics to hide."""
     name = f"{job.setup}, a {robots.STAND_IN}" if robots.stands_in_for(job.setup) else job.setup
     before = f"{caption}\n" if caption else ""
-    return f"{before}{name}: Bayesian optimisation under hidden physics ({job.gap} gap)"
+    physics = f" under hidden physics ({job.gap} gap)" if setup.gap(job.gap).intervals else ""
+    return f"{before}{name}: Bayesian optimisation{physics}"
 
 
 def lines(summary: Summary) -> Iterator[str]:

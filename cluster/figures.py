@@ -43,8 +43,10 @@ STYLES = {
     "saasbo": ("#332288", (3, 1, 0), "--"),
 }
 """Colour (Okabe and Ito's, which colour-blind people can tell apart), marker and line of each method: dotted
-without a model of f, dashed on controllers, solid on latent paths; a variant shares its colour. Markers are
-drawn without edges, so all are filled ones; a tuple is a star of that many points, turned by degrees."""
+without a model of f or by `optimize_acqf`, dashed on controllers, solid on latent paths; a variant shares its
+colour. Markers are drawn without edges, so all are filled ones; a tuple is a star of that many points, turned
+by degrees."""
+_MARKERS = 24  # at most, on a curve: more would hide its line
 _OTHER_STYLE = ("#000000", "d", "-.")
 
 
@@ -102,9 +104,9 @@ def _draw_method(
     low, high = np.clip(low, *limits), np.clip(high, *limits)
     style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 5, "markeredgewidth": 0}
     trials = np.arange(1, len(mean) + 1)
-    curves.plot(
-        trials, mean, linestyle=line, linewidth=1.4, label=f"{name} (n = {method.runs})", zorder=3, **style
-    )
+    label = f"{name} (n = {method.runs})"
+    shown = {"markevery": -(-len(mean) // _MARKERS), "linestyle": line, "linewidth": 1.4, **style}
+    curves.plot(trials, mean, label=label, zorder=3, **shown)
     curves.fill_between(trials, low, high, color=colour, alpha=0.09, linewidth=0, zorder=1)
     final.plot([place, place], [low[-1], high[-1]], color=colour, linewidth=2.5, alpha=0.5)
     final.plot([place], [mean[-1]], linestyle="", **{**style, "markersize": 7})

@@ -219,6 +219,15 @@ _RECIPES = (
                     MedianGap("all-matter", "se-acqf", 120.0, 60, low=22.5),
                 ),
             ),
+            Claim(
+                "both, where SE chooses from random points, of which none is near a corner of 30 dimensions",
+                "control",
+                (
+                    MedianGap("three-matter", "se", 12.027, 20, high=0.451),
+                    Gain("all-matter", "se", "random", 60, high=22.5),
+                    MedianGap("all-matter", "se", 120.0, 60, low=22.5),
+                ),
+            ),
         ),
     ),
 )

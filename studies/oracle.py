@@ -36,7 +36,7 @@ AFTER = (10, 20)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 METHODS = ("svae", "svae-dc", "svae-dc-whitened", "screened-svae", "screened-random")
 RANDOM: Final = "random"
-SECONDS_PER_TRIAL = 0.12
+SECONDS_PER_TRIAL = 0.05
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,7 @@ def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(j
     assert "not reached (0 of 2 runs)" in page
     written = (job.folder / "summary.json").read_text()
     found = json.loads(written, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert found["title"] == "quadratic-30d-intrinsic-3: Bayesian optimisation"  # a formula hides no physics
     assert all(method["successful_runs"]["mean"] == 0 for method in found["methods"].values())
     failed = [trial.status for _, trials in runs for trial in trials if trial.index >= 2].count("failed")
     shares = [method["failed_trials"]["mean"] for method in found["methods"].values()]
