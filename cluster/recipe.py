@@ -1,6 +1,5 @@
 """What a figure of the paper is made from: its comparisons, their data and models, and what was claimed."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from svaedc import methods
@@ -94,19 +93,6 @@ class Recipe:
     def label(self) -> str:
         """Its title, and that it is a stand-in."""
         return _labelled(self.title, stands_in=self.stands_in)
-
-
-@dataclass(frozen=True)
-class Scale:
-    """How much of the paper's data and training.
-
-    Attributes:
-        preset: of training.
-        episodes: by setup.
-    """
-
-    preset: str
-    episodes: Mapping[str, int]
 
 
 def _labelled(title: str, *, stands_in: bool) -> str:

@@ -62,7 +62,7 @@ def reproduce(
     Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
     `svaedc reproduce figure-7 --runs 50`
     """
-    from cluster import recipes
+    from cluster import recipes, scales
     from cluster.reproduce import foretell
     from cluster.reproduce import reproduce as run_reproduction
     from cluster.reproduction import cores, resolved
@@ -71,7 +71,7 @@ def reproduce(
     settings = settings_of(config, overrides)
     _require_consistent(settings, dataset, episodes)
     with usage_errors():
-        recipe, size = recipes.recipe(figure), recipes.scale(scale)
+        recipe, size = recipes.recipe(figure), scales.scale(scale)
     reproduction = resolved(
         recipe,
         size,

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from cluster.config import Settings, TrainSettings
 from cluster.errors import UserError
-from cluster.recipe import NINE, Panel, Recipe, Scale
+from cluster.recipe import NINE, Panel, Recipe
+from cluster.scales import Scale
 from cluster.trained_model import trained_model
 from cluster.training_record import MEASURES
 from svaedc.presets import Sizes, preset, usual_stride

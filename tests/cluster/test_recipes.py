@@ -4,7 +4,8 @@ import pytest
 
 from cluster.costs import comparing, training
 from cluster.recipe import Panel, Recipe
-from cluster.recipes import RECIPES, SCALES, recipe, scale
+from cluster.recipes import RECIPES, recipe
+from cluster.scales import SCALES, scale
 from svaedc import methods
 from svaedc.claims import Claim
 from svaedc.evidence import Gain, MedianGap

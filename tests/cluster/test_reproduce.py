@@ -13,11 +13,12 @@ from cluster.bill import bill, lines
 from cluster.config import CompareSettings, Settings, TrainSettings
 from cluster.errors import UserError
 from cluster.recipe import Panel, Recipe
-from cluster.recipes import RECIPES, SCALES
+from cluster.recipes import RECIPES
 from cluster.reproduce import reproduce
 from cluster.reproduction import resolved
 from cluster.reproduction_report import publish, table
 from cluster.results import RunKey, append
+from cluster.scales import SCALES
 from cluster.session import Session
 from cluster.tracking import open_tracker
 from svaedc import checkpoint
