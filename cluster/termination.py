@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+_TERMINATED = 128 + signal.SIGTERM
+
 
 @contextmanager
 def terminating_as_exit() -> Iterator[None]:
@@ -13,13 +15,19 @@ def terminating_as_exit() -> Iterator[None]:
 
     Enter it after `ray.init`, which replaces the handlers set before it. In a thread, which may not set
     handlers, it does nothing.
+
+    SIGTERM leaves the block as an exit with code 143, whatever came of it inside: an exit of any code comes
+    out of `ray.get` with code 1.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
+    terminated = threading.Event()
+
     def leave(_number: int, _frame: FrameType | None) -> None:
-        raise SystemExit(128 + signal.SIGTERM)
+        terminated.set()
+        raise SystemExit(_TERMINATED)
 
     # A compiled library may have put a handler of its own beneath Python's, which then never runs: MLflow
     # imports Polars where it is installed, and that swallows Ctrl-C. Setting Python's again takes it back.
@@ -27,5 +35,9 @@ def terminating_as_exit() -> Iterator[None]:
     previous = signal.signal(signal.SIGTERM, leave)
     try:
         yield
+    except SystemExit:
+        if terminated.is_set():
+            raise SystemExit(_TERMINATED) from None
+        raise
     finally:
         signal.signal(signal.SIGTERM, previous)

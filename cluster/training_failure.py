@@ -1,14 +1,14 @@
 """Why a group of training processes ended: some were lost, which another try survives, or one made an error.
 
-A process that is killed reaches the driver as a failed health check around an error of Ray; what its code
-raises arrives as it is. When one is lost, the others' exchange of gradients breaks off, and which of both is
-noticed first is chance.
+A process that is killed reaches the driver as a failed health check around an error of Ray, or as an error of
+the controller if that was just asking it for something; what its code raises arrives as it is. When one is
+lost, the others' exchange of gradients breaks off, and which of both is noticed first is chance.
 """
 
 import errno
 from pathlib import Path
 
-from ray.exceptions import RayError, RayTaskError
+from ray.exceptions import RayActorError, RayError, RayTaskError
 from ray.train import ControllerError, TrainingFailedError, WorkerGroupError
 from ray.train.v2._internal.exceptions import RayTrainError, WorkerHealthCheckFailedError
 from torch.distributed import DistError
@@ -19,9 +19,12 @@ _TRANSPORTS = ("gloo", "nccl")
 
 def is_death(error: TrainingFailedError) -> bool:
     """Whether processes were lost; the errors that only follow from that do not count."""
-    if not isinstance(error, WorkerGroupError):
+    causes = _causes(error)
+    if isinstance(error, ControllerError):
+        # Its other errors are of a group that never started.
+        return isinstance(causes[0], RayActorError)
+    if not causes:
         return False
-    causes = [_cause(failure) for failure in error.worker_failures.values()]
     if any(map(_is_loss, causes)):
         # How torch words what the others then run into depends on where it meets them.
         return all(_is_consequence(cause) or type(cause) is RuntimeError for cause in causes)
@@ -35,16 +38,16 @@ def explanation(error: TrainingFailedError, model: Path) -> str:
         error: that ended the training.
         model: folder of the model.
     """
-    if isinstance(error, ControllerError):
-        reason = str(error.controller_failure).partition("\n")[0]
-        return f"the training processes could not start: {reason}; try again when the cluster has room"
-    causes = [_cause(failure) for failure in getattr(error, "worker_failures", {}).values()] or [error]
+    causes = _causes(error) or [error]
     if is_death(error):
         told = _told(next(filter(_is_loss, causes), causes[0]))
         return (
             f"training processes keep dying, one of them with {told}; when that has an end, the same command "
             f"goes on from the last checkpoint in {model}"
         )
+    if isinstance(error, ControllerError):
+        reason = str(error.controller_failure).partition("\n")[0]
+        return f"the training processes could not start: {reason}; try again when the cluster has room"
     cause = next((each for each in causes if not _is_consequence(each)), causes[0])
     if isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT):
         return (
@@ -52,6 +55,14 @@ def explanation(error: TrainingFailedError, model: Path) -> str:
             f"checkpoint in {model}"
         )
     return f"training failed: {_told(cause)}"
+
+
+def _causes(error: TrainingFailedError) -> list[Exception]:
+    """What ended the controller, or each of the processes."""
+    if isinstance(error, ControllerError):
+        return [_cause(error.controller_failure)]
+    failures = error.worker_failures if isinstance(error, WorkerGroupError) else {}
+    return [_cause(failure) for failure in failures.values()]
 
 
 def _cause(failure: Exception) -> Exception:

@@ -9,9 +9,13 @@ from pathlib import Path
 import pytest
 import torch
 from ray.exceptions import ActorDiedError
-from ray.train import RunConfig, ScalingConfig, TrainingFailedError, WorkerGroupError
+from ray.train import ControllerError, RunConfig, ScalingConfig, TrainingFailedError, WorkerGroupError
 from ray.train.torch import TorchTrainer
-from ray.train.v2._internal.exceptions import WorkerHealthCheckFailedError, WorkerHealthCheckTimeoutError
+from ray.train.v2._internal.exceptions import (
+    WorkerGroupStartupTimeoutError,
+    WorkerHealthCheckFailedError,
+    WorkerHealthCheckTimeoutError,
+)
 
 from cluster.training_failure import explanation, is_death
 from cluster.training_submission import interrupts_kept
@@ -62,6 +66,15 @@ def test_an_error_of_the_training_itself_is_no_death_and_is_told_with_its_kind(f
     error = ended(*failures)
     assert not is_death(error)
     assert re.search(said, explanation(error, Path("model")))
+
+
+def test_a_process_lost_while_the_controller_asks_it_is_a_death_and_a_group_without_room_is_none(tmp_path):
+    lost = ControllerError(ActorDiedError())
+    assert is_death(lost)
+    assert "keep dying, one of them with ActorDiedError" in explanation(lost, tmp_path)
+    crowded = ControllerError(WorkerGroupStartupTimeoutError(num_workers=2))
+    assert not is_death(crowded)
+    assert explanation(crowded, tmp_path).startswith("the training processes could not start: ")
 
 
 def test_processes_that_keep_dying_are_told_as_that():
