@@ -17,6 +17,7 @@ from jaxtyping import Float, Float32
 from matplotlib.figure import Figure
 from torch import Tensor
 
+from cluster.figures import STYLES
 from cluster.training_job import episodes
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source
@@ -146,13 +147,13 @@ def draw(path: Path, found: Mapping[tuple[str, float], Result]) -> None:
     errors = [found[METHODS[0], share]["error"] for share in SHARES]
     for axes, after in zip(figure.subplots(1, len(AFTER), sharey=True), AFTER, strict=True):
         for method in METHODS:
-            axes.plot(
-                errors, [np.mean(found[method, s][f"best {after}"]) for s in SHARES], "o-", label=method
-            )
+            colour, marker, line = STYLES[method]
+            means = [np.mean(found[method, share][f"best {after}"]) for share in SHARES]
+            axes.plot(errors, means, color=colour, marker=marker, linestyle=line, label=method)
         axes.axhline(np.mean(found[RANDOM, 0.0][f"best {after}"]), color="#8c8c8c", ls=":", label=RANDOM)
         axes.invert_xaxis()
-        axes.set_xlabel("error of the decoded features, relative to the per-step median")
         axes.set_title(f"mean best objective after {after} trials", loc="left", fontsize=10)
+    figure.supxlabel("error of the decoded features, relative to the per-step median", fontsize=10)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=8)
     figure.savefig(path, dpi=130)
 
