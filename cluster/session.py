@@ -201,7 +201,7 @@ def _admitted(address: str, patience: float) -> set[str]:
     try:
         return _machines(address, patience)
     except AuthenticationError:
-        _use_token()
+        use_token()
         return _machines(address, patience)
 
 
@@ -219,7 +219,7 @@ def _machines(address: str, patience: float) -> set[str]:
         time.sleep(0.2)
 
 
-def _use_token() -> None:
+def use_token() -> None:
     """Shows a token to the cluster if this user has one; Ray does so for clusters of its own only."""
     loader = AuthenticationTokenLoader.instance()
     if "RAY_AUTH_MODE" not in os.environ and loader.has_token(ignore_auth_mode=True):

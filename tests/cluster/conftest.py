@@ -61,12 +61,14 @@ def head(tmp_path_factory):
 
 
 @pytest.fixture
-def machines(monkeypatch):
+def machines():
     """A cluster on loopback to which machines may be added, and from which they may be torn.
 
-    Its head has no CPUs; it wants no token.
+    Its head has no CPUs. Its token is that of all tests: a process keeps the first one that it has shown.
     """
-    monkeypatch.delenv("RAY_AUTH_TOKEN")
+    from cluster.session import use_token
+
+    use_token()
     # Ray leaves a socket open where the port is taken, as its usual one is while another cluster runs here.
     head = {"num_cpus": 0, "dashboard_port": free_ports(1)[0], **MACHINE}
     cluster = Cluster(initialize_head=True, head_node_args=head)
