@@ -150,7 +150,7 @@ def draw(path: Path, found: Mapping[str, Result]) -> None:
     """The gain of every cell with its interval, after 10 and after 20 trials."""
     figure = Figure(figsize=(10, 0.32 * len(found) + 1.2), layout="constrained")
     places = np.arange(len(found))[::-1]
-    for axes, after in zip(figure.subplots(1, len(AFTER), sharey=True), AFTER, strict=True):
+    for axes, after in zip(figure.subplots(1, len(AFTER), sharex=True, sharey=True), AFTER, strict=True):
         mean, low, high = ([result[f"{part} {after}"] for result in found.values()] for part in PARTS)
         axes.axvline(0, color="#8c8c8c", linewidth=0.8)
         axes.hlines(places, low, high, color="#d55e00", linewidth=2, alpha=0.6)
