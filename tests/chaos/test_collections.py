@@ -72,12 +72,12 @@ def test_no_kill_of_driver_actors_or_ray_changes_a_byte(tmp_path, undisturbed, d
         require_part(folder, undisturbed)
         if published(folder).keys() == undisturbed.keys():
             # The next command finds nothing to do: what it shall sweep must have no living writer any more.
-            assert victims.wait_until_gone(blows.seen, 60.0) == set()
+            assert victims.wait_until_gone(blows.seen, PATIENCE) == set()
         if code == 0:
             require_same(folder, undisturbed, [unfinished])
             unfinished, finished = None, finished + 1
             print(f"{blows}; {finished} collections finished")
-    assert victims.wait_until_gone(blows.seen, 60.0) == set()
+    assert victims.wait_until_gone(blows.seen, PATIENCE) == set()
 
 
 class Pair:

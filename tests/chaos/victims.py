@@ -56,12 +56,12 @@ def births(pids: list[int]) -> set[tuple[int, str]]:
     return {(pid, born) for pid in pids if (born := _born(pid))}
 
 
-def wait_until_gone(processes: set[tuple[int, str]], seconds: float) -> set[tuple[int, str]]:
-    """The processes that still live when the time is over, or none as soon as that is so."""
+def wait_until_gone(processes: set[tuple[int, str]], seconds: float) -> set[str]:
+    """What the processes that still live when the time is over call themselves, or nothing once none does."""
     deadline = time.monotonic() + seconds
     while (left := {each for each in processes if _born(each[0]) == each[1]}) and time.monotonic() < deadline:
         time.sleep(0.05)
-    return left
+    return {f"{pid} {command(pid)}" for pid, _ in left}
 
 
 def _born(pid: int) -> str:
