@@ -63,10 +63,8 @@ def reproduce(
     `svaedc reproduce figure-7 --runs 50`
     """
     from cluster import recipes, scales
-    from cluster.reproduce import foretell
     from cluster.reproduce import reproduce as run_reproduction
-    from cluster.reproduction import cores, resolved
-    from cluster.session import connect
+    from cluster.reproduction import resolved
 
     settings = settings_of(config, overrides)
     _require_consistent(settings, dataset, episodes)
@@ -81,15 +79,24 @@ def reproduce(
         dataset=dataset,
         models=tuple(path.expanduser().absolute() for path in model or ()),
     )
-    if plan and not address:
-        foretell(reproduction, settings, cores(settings))
-        return
     if plan:
-        with connect(settings.ray, address) as session:
-            foretell(reproduction, settings, session.cpus)
+        _foretell(reproduction, settings, address)
         return
     with services(settings, address) as (session, tracker):
         run_reproduction(reproduction, settings, session, tracker)
+
+
+def _foretell(reproduction: Any, settings: Settings, address: str | None) -> None:
+    """Starts nothing; a cluster that runs is asked for its CPUs."""
+    from cluster.reproduce import foretell
+    from cluster.reproduction import cores
+    from cluster.session import connect
+
+    if not address:
+        foretell(reproduction, settings, cores(settings))
+        return
+    with connect(settings.ray, address) as session:
+        foretell(reproduction, settings, session.cpus)
 
 
 def _require_consistent(settings: Settings, dataset: Location | None, episodes: int | None) -> None:

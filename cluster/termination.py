@@ -17,7 +17,7 @@ def terminating_as_exit() -> Iterator[None]:
     handlers, it does nothing.
 
     SIGTERM leaves the block as an exit with code 143, whatever came of it inside: an exit of any code comes
-    out of `ray.get` with code 1.
+    out of `ray.get` with code 1, and out of a training as Ctrl-C.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -35,7 +35,7 @@ def terminating_as_exit() -> Iterator[None]:
     previous = signal.signal(signal.SIGTERM, leave)
     try:
         yield
-    except SystemExit:
+    except (KeyboardInterrupt, SystemExit):
         if terminated.is_set():
             raise SystemExit(_TERMINATED) from None
         raise

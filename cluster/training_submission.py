@@ -7,7 +7,6 @@ import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from types import FrameType
 from typing import Any
 
 from ray.train import RunConfig, ScalingConfig, TrainingFailedError
@@ -106,30 +105,18 @@ def _workers(placement: Placement) -> Any:
 
 @contextmanager
 def interrupts_kept() -> Iterator[None]:
-    """Keeps the meaning of Ctrl-C and SIGTERM in the main thread.
+    """Keeps the meaning of Ctrl-C in the main thread.
 
-    Ray Train's handler for Ctrl-C exits, stays for good, and is not told apart from SIGTERM afterwards:
-    whatever code an exit had, it comes out of `ray.get` as 1.
+    Ray Train's handler for it exits, and stays for good. An exit here was that one or SIGTERM, which
+    `terminating_as_exit` knows.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    interrupt, terminate = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    terminated = threading.Event()
-
-    def note(number: int, frame: FrameType | None) -> None:
-        terminated.set()
-        if callable(terminate):
-            terminate(number, frame)
-
-    if callable(terminate):
-        signal.signal(signal.SIGTERM, note)
+    interrupt = signal.getsignal(signal.SIGINT)
     try:
         yield
     except SystemExit:
-        if terminated.is_set():
-            raise SystemExit(128 + signal.SIGTERM) from None
         raise KeyboardInterrupt from None
     finally:
         signal.signal(signal.SIGINT, interrupt)
-        signal.signal(signal.SIGTERM, terminate)

@@ -4,7 +4,6 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 
 import pytest
 import torch
@@ -15,6 +14,7 @@ from cluster.errors import UserError
 from cluster.mailbox import mailbox
 from cluster.placement import Placement
 from cluster.progress import ProgressLine
+from cluster.termination import terminating_as_exit
 from cluster.tracking import open_tracker
 from cluster.training_job import TrainingJob, trained
 from cluster.training_submission import interrupts_kept, submit
@@ -95,7 +95,7 @@ def test_ctrl_c_and_sigterm_keep_their_meaning_whatever_ray_makes_of_them():
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 
     def leave(number: int) -> None:
-        with interrupts_kept():
+        with terminating_as_exit(), interrupts_kept():
             # Ray Train's handler, and what `ray.get` makes of every exit.
             signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
             try:
@@ -103,16 +103,8 @@ def test_ctrl_c_and_sigterm_keep_their_meaning_whatever_ray_makes_of_them():
             except SystemExit:
                 sys.exit(1)
 
-    def terminated(number: int, _: FrameType | None) -> None:
-        sys.exit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, terminated)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            leave(signal.SIGINT)
-        with pytest.raises(SystemExit, match="143"):
-            leave(signal.SIGTERM)
-        assert signal.getsignal(signal.SIGTERM) is terminated
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    with pytest.raises(KeyboardInterrupt):
+        leave(signal.SIGINT)
+    with pytest.raises(SystemExit, match="143"):
+        leave(signal.SIGTERM)
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
