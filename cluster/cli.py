@@ -20,7 +20,6 @@ from cluster.options import (
     durable,
     settings_of,
     setup_of,
-    usage_errors,
     working,
 )
 from cluster.progress import say
@@ -165,27 +164,23 @@ def compare(
     All methods of a seed share their random trials and the hidden physics. Report seeds below 1000; tune with
     --seed 1000 and above. Writes trials.parquet, summary.json, report.html, figure.png and figure.svg.
     """
-    from cluster.compare import compare as run_compare
+    from cluster.compare import compare as run_comparison
+    from cluster.comparison_plan import planned
     from cluster.grid import Grid
 
-    settings, chosen = settings_of(config, overrides), setup_of(setup)
+    settings = settings_of(config, overrides)
     names = tuple(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-    grid = Grid(names, seed, runs)
-    grid.require(model)
-    with usage_errors():
-        chosen.gap(gap)
+    plan = planned(
+        setup=setup_of(setup),
+        grid=Grid(names, seed, runs),
+        trials=trials,
+        gap=gap,
+        model=model,
+        folder=out,
+        settings=settings.compare,
+    )
     with services(settings, address) as (session, tracker):
-        run_compare(
-            setup=chosen,
-            grid=grid,
-            trials=trials,
-            gap=gap,
-            model=model,
-            folder=out,
-            settings=settings.compare,
-            session=session,
-            tracker=tracker,
-        )
+        run_comparison(plan, session, tracker)
 
 
 @app.command()

@@ -22,8 +22,8 @@ from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import Identity
 from workers.dataset.inventory import sweep_digests
 from workers.dataset.location import Location
-from workers.dataset.publication import wait_for_end
 from workers.dataset.shards import Shard
+from workers.dataset.writers import wait_for_end
 
 _DISK = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),

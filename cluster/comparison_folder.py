@@ -80,7 +80,7 @@ def _begun(folder: Path) -> bool:
 
 def _read(path: Path, identity: Mapping[str, Any]) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text())
+        found = {"setup_digest": "", **json.loads(path.read_text())}  # which earlier comparisons lack
         return {name: found[name] for name in (*identity, "model")}
     except FileNotFoundError as error:
         reason = "is gone, though there are runs"

@@ -2,7 +2,7 @@
 
 import errno
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -57,6 +57,11 @@ class ComparisonJob:
     def length(self) -> int:
         """Trials of a whole run."""
         return self.initial + self.trials
+
+    def require(self, names: Sequence[str], setup: Setup) -> None:
+        """Refuse what every run of one of these methods would fail of, with a `ValueError`."""
+        for name in names:
+            methods.require(name, self._problem(RunKey(name, 0), setup), self.trials)
 
     def run(self, key: RunKey, setup: Setup, environment: Environment) -> Iterator[Trial]:
         """The missing trials of a run; each is on disk before it is yielded."""

@@ -10,8 +10,8 @@ from cluster.progress import ProgressLine
 from workers.dataset.folder import Dataset
 from workers.dataset.lerobot_export import export_lerobot
 from workers.dataset.numpy_export import export_npz
-from workers.dataset.publication import is_dead, writer
 from workers.dataset.shards import Shard
+from workers.dataset.writers import is_dead, writer
 
 FORMATS: Mapping[str, Callable[[Dataset, Path], Iterator[Shard]]] = {
     "npz": export_npz,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cluster.collect import collect
 from cluster.compare import Comparison, compare
+from cluster.comparison_plan import planned
 from cluster.config import Settings
 from cluster.grid import Grid
 from cluster.placement import free_machines
@@ -103,7 +104,7 @@ def _train(folder: Path, settings: Settings, session: Session, tracker: Tracker,
 def _compare(
     folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize
 ) -> Comparison:
-    return compare(
+    plan = planned(
         setup=setups.load(SETUP),
         grid=Grid(size.methods, seed=0, runs=size.runs),
         trials=size.trials,
@@ -111,9 +112,8 @@ def _compare(
         model=folder / "model",
         folder=folder / "comparison",
         settings=settings.compare,
-        session=session,
-        tracker=tracker,
     )
+    return compare(plan, session, tracker)
 
 
 def _preflight(settings: Settings, size: DemoSize, session: Session) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cluster.errors import UsageError, UserError
 from cluster.options import usage_errors
@@ -70,3 +71,14 @@ class Grid:
             raise UserError(
                 f"{folder} holds runs of another purpose; choose another folder with --out: {error}"
             ) from error
+
+
+def described(keys: Iterable[RunKey]) -> dict[str, Any]:
+    """What a page says of runs of several commands: all methods, all seeds."""
+    found = list(keys)
+    runs = sorted({key.run for key in found})
+    return {
+        "methods": ", ".join(sorted({key.method for key in found})),
+        "seed": f"{runs[0]} to {runs[-1]}" if runs else "",
+        "runs": len(runs),
+    }

@@ -77,8 +77,8 @@ def _remarks(summary: Summary) -> Iterable[str]:
         yield "Nobody reached the threshold of success: no run of any method succeeded in any trial."
     if any(method.failed_trials.mean > 0 for method in ran):
         yield (
-            "Some trials gave no objective. They teach no method anything, are not tried again by those that "
-            "search a pool, and enter no mean; the last column has their share."
+            "Some trials gave no objective. They teach no method anything, are not tried again, and enter no "
+            "mean; the last column has their share."
         )
 
 

@@ -3,6 +3,7 @@
 from cluster.bill import bill, lines
 from cluster.collect import collect
 from cluster.compare import compare
+from cluster.comparison_plan import planned
 from cluster.config import Settings
 from cluster.grid import Grid
 from cluster.placement import free_machines
@@ -92,7 +93,7 @@ def _compare(
     reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
 ) -> Summary:
     with timed(f"compare {panel.name}"):
-        return compare(
+        plan = planned(
             setup=setups.load(panel.setup),
             grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
             trials=panel.trials,
@@ -100,7 +101,6 @@ def _compare(
             model=reproduction.models[panel.latent] if panel.latent else None,
             folder=reproduction.comparison(panel),
             settings=settings.compare,
-            session=session,
-            tracker=tracker,
             caption=f"{reproduction.recipe.figure}, {panel.name}: {panel.title}",
-        ).summary
+        )
+        return compare(plan, session, tracker).summary

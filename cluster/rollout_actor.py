@@ -4,8 +4,8 @@ from workers import setups
 from workers.collection import ShardReport, collect_shard, require_same_code, require_working
 from workers.dataset.folder import open_dataset
 from workers.dataset.location import location
-from workers.dataset.publication import writer
 from workers.dataset.shards import Shard, sweep
+from workers.dataset.writers import writer
 from workers.tasks.own_bad import with_bad
 
 

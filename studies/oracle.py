@@ -22,7 +22,7 @@ from cluster.training_job import episodes
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source
 from svaedc import checkpoint, methods
-from svaedc.candidates import Problem
+from svaedc.candidates import Problem, as_they_are
 from svaedc.comparison import trials
 from svaedc.episodes import Batch, Episodes, measured_over
 from svaedc.features import LatentMeans, Latents
@@ -70,11 +70,8 @@ def compute(source: Source, model_path: Path, cell: Cell) -> Result:
     known = codes(model.eval(), chosen, cell.share)
     limits = setups.load(dataset.identity.setup).objective_limits
     pool = Recorded(np.asarray(cache.x[chosen.rows]), np.asarray(cache.f[chosen.rows]), limits)
-    tau, y = known["tau"], known["y"]
-    if cell.method == RANDOM:
-        y = torch.full_like(y, 0.5)  # the least bad ones of equal candidates are any
-    name = "screened-random" if cell.method == RANDOM else cell.method
-    best = [_best(name, pool, looked_up(pool.x, tau, y), run) for run in range(cell.runs)]
+    latent_means = looked_up(pool.x, known["tau"], known["y"])
+    best = [_best(cell.method, pool, latent_means, run) for run in range(cell.runs)]
     kept = {f"best {n}": [each[INITIAL + n - 1] for each in best] for n in AFTER}
     error = (known["error"].mean(0) / known["median"].mean(0))[known["median"].mean(0) > 0].mean()
     truth = torch.from_numpy(np.asarray(chosen.y[chosen.rows]))
@@ -123,8 +120,10 @@ def _best(method: str, pool: Recorded, latent_means: LatentMeans, run: int) -> l
     latents = Latents.of(torch.from_numpy(pool.x), latent_means)
     problem = Problem(pool.x.shape[1], pool.limits, pool.x, latents)
     first = pool.x[np.random.default_rng((run, 0)).choice(len(pool.x), INITIAL, replace=False)]
+    # Nothing is known of controllers between the candidates, where `random` would draw.
+    drawn = methods.PoolSearch(as_they_are(problem)) if method == RANDOM else methods.build(method, problem)
     records = trials(
-        methods.build(method, problem),
+        drawn,
         pool.outcome,
         first,
         max(AFTER),

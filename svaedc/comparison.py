@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ class Outcome:
     """What evaluating one controller showed.
 
     Attributes:
-        f: Objective; NaN when the evaluation gave none.
+        f: Objective; NaN when the evaluation gave none. Infinite ones count as none.
         y: Badness in [0, 1]; NaN when unknown.
         success: Whether the task counts as solved.
         stop: Stop reason; empty when the trial ran to its end.
@@ -91,11 +91,15 @@ def trials(
     for index in range(len(earlier), len(initial) + count):
         start = clock()
         x = initial[index] if index < len(initial) else method.suggest(history, rng_for(index))
-        outcome = evaluate(x.copy())
+        outcome = _measured(evaluate(x.copy()))
         history = history.append(x, outcome.f)
         trial = _record(index, x, outcome, best, clock() - start)
         best = trial.best
         yield trial
+
+
+def _measured(outcome: Outcome) -> Outcome:
+    return outcome if math.isfinite(outcome.f) else replace(outcome, f=math.nan)
 
 
 def _record(index: int, x: Float32[np.ndarray, " D"], outcome: Outcome, best: float, seconds: float) -> Trial:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol, runtime_checkable
 
-from svaedc.intervals import Estimate
+from svaedc.intervals import Estimate, ratio
 from svaedc.summaries import Difference, MethodSummary, Summary
 
 Verdict = Literal["holds", "does not hold", "open", "not measured"]
@@ -117,6 +117,32 @@ class Like:
 
 
 @dataclass(frozen=True)
+class NoBetter:
+    """A method's best objective so far is not above a baseline's, over shared seeds; it may be below.
+
+    Attributes:
+        panel: Name of the panel.
+        method: The one that does not gain.
+        baseline: The other one.
+        after: Suggested trials.
+    """
+
+    panel: str
+    method: str
+    baseline: str
+    after: int
+
+    @property
+    def measure(self) -> str:
+        """Method minus baseline, which is said not to be above 0."""
+        return f"{self.method} − {self.baseline} ≤ 0, best after {self.after}"
+
+    def found(self, panels: Panels, initial: int) -> Finding:
+        """Holds unless the whole interval of the paired difference is above 0."""
+        return _judged(self, panels, initial, _not_above_zero)
+
+
+@dataclass(frozen=True)
 class Successes:
     """The share of runs, or of suggested trials, with a success lies in a range.
 
@@ -206,20 +232,20 @@ class Steadier:
         return f"{self.method}, width of the last interval, {self.panel} / {self.than}"
 
     def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
-        """Holds if the ratio, of equal numbers of runs, is below 1; it has no interval of its own."""
+        """Holds if the interval of the ratio, over equal numbers of runs, is below 1."""
         found = [_method(panels.get(name), self.method) for name in (self.panel, self.than)]
         counts = [method.runs if method else 0 for method in found]
         if min(counts) < 2 or len(set(counts)) > 1:
             return UNKNOWN
         narrow, wide = (method.best[-1].high - method.best[-1].low for method in found if method)
-        ratio = narrow / wide if wide else math.inf
-        return Finding(
-            Estimate(ratio, math.nan, math.nan), counts[0], "holds" if ratio < 1 else "does not hold"
-        )
+        # Student's intervals of equally many runs are as wide as their standard deviations.
+        value = ratio(narrow, wide, counts[0], 0.9)
+        verdict: Verdict = "holds" if value.high < 1 else "does not hold" if value.low > 1 else "open"
+        return Finding(value, counts[0], verdict)
 
 
 def _judged(
-    evidence: Gain | Like, panels: Panels, initial: int, verdict: Callable[[Estimate], Verdict]
+    evidence: Gain | Like | NoBetter, panels: Panels, initial: int, verdict: Callable[[Estimate], Verdict]
 ) -> Finding:
     difference = _difference(panels.get(evidence.panel), evidence.method, evidence.baseline)
     index = initial + evidence.after - 1
@@ -243,3 +269,7 @@ def _difference(summary: Summary | None, method: str, baseline: str) -> Differen
 
 def _includes_zero(value: Estimate) -> Verdict:
     return "holds" if value.low <= 0 <= value.high else "does not hold"
+
+
+def _not_above_zero(value: Estimate) -> Verdict:
+    return "does not hold" if value.low > 0 else "holds"

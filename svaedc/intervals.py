@@ -47,6 +47,17 @@ def share(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate:
     return Estimate(found.mean, *np.clip([found.low, found.high], 0, 1).tolist())
 
 
+def ratio(narrow: float, wide: float, runs: int, confidence: float) -> Estimate:
+    """Ratio of the standard deviations of two groups of so many runs, with the interval of F.
+
+    It is exact for normal values, and too narrow where a few runs are far off. The groups count as
+    independent.
+    """
+    found = narrow / wide if wide else math.inf
+    far = math.sqrt(stats.f.ppf((1 + confidence) / 2, runs - 1, runs - 1))
+    return Estimate(found, found / far, found * far)
+
+
 def bootstrap(
     values: Float[np.ndarray, "runs columns"], confidence: float, rng: np.random.Generator
 ) -> tuple[Estimate, ...]:

@@ -167,6 +167,31 @@ def build(name: str, problem: Problem) -> Method:
         raise ValueError(f"method {name!r}: {error}") from error
 
 
+def require(name: str, problem: Problem, trials: int) -> None:
+    """Refuses a method that could not suggest so many controllers.
+
+    Raises:
+        LookupError: There is no such method.
+        ValueError: The problem lacks what the method needs, or its pool would run dry.
+    """
+    method = build(name, problem)
+    candidates = _pool_of(method)
+    if candidates is not None and len(candidates.x) < trials:
+        raise ValueError(
+            f"method {name!r} may choose from {len(candidates.x)} of {len(problem.pool)} controllers, "
+            f"fewer than its {trials} trials: draw a larger pool"
+        )
+
+
+def _pool_of(method: Method) -> Candidates | None:
+    match method:
+        case PoolSearch(candidates):
+            return candidates
+        case Optimisation(belief, _, OverPool()) | TrustRegionOptimisation(belief, _, OverPool()):
+            return belief.candidates
+    return None
+
+
 def _optimisation(name: _Name, problem: Problem) -> Method:
     if name.search == "pool" and not len(problem.pool):
         raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")

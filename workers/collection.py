@@ -9,8 +9,8 @@ import numpy as np
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.publication import host
 from workers.dataset.shards import Shard
+from workers.dataset.writers import host
 from workers.rollout import DIVERGED, Episode, random_episode
 from workers.setups import MODULES, Setup
 

@@ -20,8 +20,8 @@ from workers.dataset import shards
 from workers.dataset.folder import MANIFEST, Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import sweep_digests
-from workers.dataset.publication import WRITING, writer
 from workers.dataset.shards import Shard, present
+from workers.dataset.writers import WRITING, writer
 
 REPOSITORY = Path(__file__).parents[2]
 SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 2400

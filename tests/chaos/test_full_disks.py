@@ -14,7 +14,7 @@ from tests.chaos.drivers import (
     seed,
 )
 from workers.dataset.folder import MANIFEST
-from workers.dataset.publication import WRITING
+from workers.dataset.writers import WRITING
 
 pytestmark = pytest.mark.chaos
 

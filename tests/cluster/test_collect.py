@@ -32,9 +32,9 @@ from workers.collection import collect_shard
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import inventory
-from workers.dataset.publication import WRITING, host, writer
 from workers.dataset.shards import Shard, digest_path
 from workers.dataset.verification import verify
+from workers.dataset.writers import WRITING, host, writer
 
 SETTINGS = CollectSettings(actors=2, episodes_per_shard=8)
 

@@ -10,6 +10,7 @@ import sys
 import time
 from base64 import b64encode
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ import torch
 from matplotlib.markers import MarkerStyle
 
 from cluster import figures
-from cluster.compare import compare, usable
-from cluster.comparison_folder import alone_in
+from cluster.compare import compare
+from cluster.comparison_folder import alone_in, claim
 from cluster.comparison_job import evaluation
+from cluster.comparison_plan import planned, usable
 from cluster.comparison_runs import Standing
 from cluster.comparison_tracking import begin
 from cluster.config import CompareSettings, TrackingSettings
@@ -36,6 +38,7 @@ from svaedc.model import SvaeDc
 from svaedc.presets import Sizes, compact
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row
+from svaedc.variants import varied
 from workers import setups
 
 SETTINGS = CompareSettings(slots=2, pool_size=200)
@@ -64,7 +67,7 @@ def compared(ray_session, tracking_settings, tmp_path):
         folder: Path = tmp_path / "out",
         tracking: TrackingSettings = tracking_settings,
     ) -> Path:
-        compare(
+        plan = planned(
             setup=setups.load("franka"),
             grid=Grid(tuple(methods.split(",")), seed=1000, runs=runs),
             trials=trials,
@@ -72,9 +75,8 @@ def compared(ray_session, tracking_settings, tmp_path):
             model=model,
             folder=folder,
             settings=settings,
-            session=ray_session,
-            tracker=open_tracker(tracking),
         )
+        compare(plan, ray_session, open_tracker(tracking))
         return folder
 
     return run
@@ -342,6 +344,50 @@ def test_a_model_of_another_setup_or_a_damaged_one_is_refused(compared, tmp_path
         compared("svae", model=tmp_path / "nowhere")
 
 
+def planned_with(**changes):
+    usual = {
+        "setup": setups.load("franka"),
+        "grid": Grid(("random", "svae-dc"), seed=1000, runs=1),
+        "trials": 5,
+        "gap": "paper",
+        "settings": SETTINGS,
+    }
+    return planned(**{**usual, **changes})
+
+
+def test_a_model_without_badness_is_refused_for_methods_that_compress_before_anything_runs(tmp_path):
+    torch.manual_seed(0)
+    model = SvaeDc(varied(compact(Sizes(48, 25, 100)), {"model": "svae"}).model)
+    (tmp_path / "svae").mkdir()
+    checkpoint.save(tmp_path / "svae" / "model.pt", model, {"setup": "franka"})
+    with pytest.raises(UserError, match="'svae-dc': the model must predict badness, got an SVAE"):
+        planned_with(model=tmp_path / "svae", folder=tmp_path / "out")
+    planned_with(grid=Grid(("svae",), 1000, 1), model=tmp_path / "svae", folder=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_pool_with_fewer_controllers_than_trials_is_refused_naming_the_setting(tmp_path):
+    few, grid = CompareSettings(pool_size=15), Grid(("screened-random",), 1000, 1)
+    model = untrained(tmp_path / "model")
+    with pytest.raises(
+        UserError, match=r"compare\.pool_size is 15.*may choose from 5 of 15 .* fewer than its 6 trials"
+    ):
+        planned_with(grid=grid, trials=6, model=model, settings=few, folder=tmp_path / "out")
+
+
+def test_runs_of_a_setup_whose_code_has_changed_are_not_mixed(tmp_path):
+    setup = replace(setups.load("franka"), code="1" * 64)
+    plans = [
+        planned_with(grid=Grid(("random",), 1000, 1), setup=each, model=None, folder=tmp_path)
+        for each in (setup, replace(setup, code="2" * 64))
+    ]
+    (tmp_path / "runs").mkdir()
+    claim(tmp_path, plans[0].identity, "")
+    claim(tmp_path, plans[0].identity, "")
+    with pytest.raises(UserError, match=r"with setup_digest '1111.*, not '2222"):
+        claim(tmp_path, plans[1].identity, "")
+
+
 def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):
     on_franka, on_yumi = (untrained(tmp_path / name, setup=name) for name in ("franka", "yumi"))
     assert usable(on_franka, setups.load("franka-rehearsal"))[1] == "franka"
@@ -464,15 +510,17 @@ def test_a_copy_among_the_records_is_no_run(tmp_path):
 
 
 @pytest.mark.slow
-def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_run(compared, tmp_path, capfd):
-    few = CompareSettings(slots=2, pool_size=3)
-    with pytest.raises(UserError, match=r"1 of 2 runs kept failing.*ValueError: all 3 candidates .* tried"):
-        compared("random,se", runs=1, trials=5, settings=few)
-    errors = (tmp_path / "out" / "errors.txt").read_text()
-    assert "candidates.py" in errors
+def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_run(compared, capfd):
+    out = compared("random", runs=1, trials=5)
+    append(RunKey("se", 1000).path(out), trial(0))  # of another controller than the runs of this seed share
+    capfd.readouterr()
+    with pytest.raises(UserError, match=r"1 of 2 runs kept failing.*ValueError: trial 0 must have tried"):
+        compared("se,matern", runs=1, trials=5)
+    errors = (out / "errors.txt").read_text()
+    assert "comparison.py" in errors
     assert {sign for sign in errors if not sign.isprintable()} == {"\n"}
-    assert len(recorded(RunKey("random", 1000).path(tmp_path / "out"))) == 7
-    assert len(recorded(RunKey("se", 1000).path(tmp_path / "out"))) == 5
+    assert len(recorded(RunKey("matern", 1000).path(out))) == 7
+    assert len(recorded(RunKey("se", 1000).path(out))) == 1
     said = capfd.readouterr()
     assert said.out == ""
     lines = [line for line in said.err.splitlines() if "best so far" not in line]

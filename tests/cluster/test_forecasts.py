@@ -14,7 +14,7 @@ from cluster.tracking import open_tracker
 from workers import setups
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.publication import WRITING
+from workers.dataset.writers import WRITING
 from workers.forecast import Estimate, Forecast
 
 SETTINGS = CollectSettings(actors=2, episodes_per_shard=2)

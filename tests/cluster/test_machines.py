@@ -15,7 +15,7 @@ from workers import setups
 from workers.collection import collect_shard
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.publication import WRITING
+from workers.dataset.writers import WRITING
 
 REPOSITORY = Path(__file__).parents[2]
 SLOW = '''

@@ -24,7 +24,7 @@ from workers.collection import collect_shard
 from workers.dataset.folder import Dataset, create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.location import Location
-from workers.dataset.publication import WRITING
+from workers.dataset.writers import WRITING
 
 SETUP = "quadratic-30d"
 

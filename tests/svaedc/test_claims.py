@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from svaedc.claims import Claim
-from svaedc.evidence import Evidence, Gain, Like, MedianGap, Steadier, Successes
+from svaedc.evidence import Evidence, Gain, Like, MedianGap, NoBetter, Steadier, Successes
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row
 
@@ -34,6 +34,7 @@ def around(middle: float, spread: float) -> list[float]:
 PANELS = {
     "left": panel({"good": around(0.6, 1), "bad": around(0.2, -1), "twin": around(0.6, -1)}),
     "tight": panel({"good": around(0.6, 0.25)}),
+    "other": panel({"good": around(0.6, 1.2)}),
 }
 
 
@@ -51,6 +52,9 @@ PANELS = {
         (Gain("absent", "good", "bad", 3), "not measured"),
         (Like("left", "good", "twin", 3), "holds"),
         (Like("left", "good", "bad", 3), "does not hold"),
+        (NoBetter("left", "good", "twin", 3), "holds"),
+        (NoBetter("left", "bad", "good", 3), "holds"),
+        (NoBetter("left", "good", "bad", 3), "does not hold"),
         (Successes("left", "good", "runs", 0.5, 1.0), "holds"),
         (Successes("left", "good", "runs", 0.0, 0.4), "does not hold"),
         (Successes("left", "bad", "trials", 0.0, 0.04), "holds"),
@@ -62,6 +66,7 @@ PANELS = {
         (MedianGap("left", "absent", 1.0, 3), "not measured"),
         (Steadier("tight", "left", "good"), "holds"),
         (Steadier("left", "tight", "good"), "does not hold"),
+        (Steadier("left", "other", "good"), "open"),
         (Steadier("tight", "left", "bad"), "not measured"),
         (Steadier("tight", "absent", "good"), "not measured"),
     ],
@@ -86,10 +91,12 @@ def test_the_shares_are_those_of_runs_and_of_suggested_trials():
     assert among_runs.runs == 4
 
 
-def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_without_an_interval():
+def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_with_the_interval_of_a_ratio():
     found = Steadier("tight", "left", "good").found(PANELS, INITIAL)
     assert found.value.mean == pytest.approx(0.25)
-    assert math.isnan(found.value.low)
+    # The table of F for 7 and 7 degrees of freedom: 3.787 is exceeded by 5 %.
+    assert found.value.high == pytest.approx(0.25 * math.sqrt(3.787), rel=1e-3)
+    assert found.value.low == pytest.approx(0.25 / math.sqrt(3.787), rel=1e-3)
 
 
 def test_the_gap_is_that_of_the_median_run_and_not_of_the_mean():
@@ -109,6 +116,7 @@ def test_one_run_leaves_a_gain_open():
 def test_every_measure_says_what_it_is_about():
     assert Gain("left", "good", "bad", 3, high=2.5).measure == "good − bad ≤ 2.5, best after 3"
     assert Like("left", "good", "bad", 3).measure == "good − bad ≈ 0, best after 3"
+    assert NoBetter("left", "good", "bad", 3).measure == "good − bad ≤ 0, best after 3"
     assert Successes("left", "good", "runs", 0.0, 1.0).measure == "good, share of runs with a success"
     assert MedianGap("left", "good", 12.0, 3, low=2.5).measure == "good, median gap to 12 ≥ 2.5, best after 3"
     assert Steadier("tight", "left", "good").measure == "good, width of the last interval, tight / left"

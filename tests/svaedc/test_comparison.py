@@ -89,6 +89,18 @@ def test_failed_trial_is_kept_in_the_record_and_its_controller_never_tried_again
     assert all(np.isfinite(trial.best) for trial in records)
 
 
+@pytest.mark.parametrize("impossible", [float("inf"), float("-inf")])
+def test_an_infinite_objective_is_a_failed_trial_and_the_run_goes_on(impossible):
+    def endless_on_the_left(x):
+        return Outcome(impossible, 0.5, True) if x[0] < 0.4 else evaluate(x)
+
+    records = list(run(evaluate=endless_on_the_left, count=12))
+    failed = [trial for trial in records if trial.x[0] < 0.4]
+    assert failed
+    assert {(trial.status, trial.success, repr(trial.f)) for trial in failed} == {("failed", False, "nan")}
+    assert all(np.isfinite(trial.best) for trial in records)
+
+
 def test_best_is_unknown_until_there_is_an_objective():
     first_fails = np.array([[0.1, 0.5], [0.9, 0.1]], dtype=np.float32)
     records = list(run(evaluate=fails_on_the_left, initial=first_fails, count=0))

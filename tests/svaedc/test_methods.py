@@ -52,6 +52,21 @@ def test_screened_random_search_exhausts_its_share_and_says_so():
         method.suggest(history, np.random.default_rng(9))
 
 
+@pytest.mark.parametrize("name", ["screened-random", "screened-svae", "se", "svae-dc", "turbo-pool"])
+def test_a_pool_that_would_run_dry_is_refused_before_the_first_trial(name):
+    given, kept = problem(3, 10, 0), 3 if "screened" in name else 10
+    methods.require(name, given, kept)
+    with pytest.raises(
+        ValueError, match=rf"'{name}' may choose from {kept} of 10 .* its {kept + 1} trials.*larger pool"
+    ):
+        methods.require(name, given, kept + 1)
+
+
+@pytest.mark.parametrize("name", ["random", "botorch", "svae-dc-acqf"])
+def test_a_method_that_searches_the_cube_never_runs_dry(name):
+    methods.require(name, problem(3, 10, 0), 1_000)
+
+
 def test_compression_spends_fewer_trials_on_controllers_predicted_bad():
     def mean_badness(name):
         badness = []

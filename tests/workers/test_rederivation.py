@@ -13,10 +13,10 @@ from workers.dataset import schema, shards
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import inventory, sweep_digests
-from workers.dataset.publication import WRITING, writer
 from workers.dataset.replacement import REPLACED, Repair
 from workers.dataset.shards import Shard, digest_path, sha256
 from workers.dataset.verification import verify
+from workers.dataset.writers import WRITING, writer
 from workers.rederivation import broken, drawn, rederive, repair
 
 FRANKA = setups.load("franka")

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from workers.dataset.folder import Dataset
 from workers.dataset.location import Location, files
 from workers.dataset.manifest import MANIFEST, manifest_text
-from workers.dataset.publication import WRITING
 from workers.dataset.shards import Shard, missing, named, recorded_digest, sha256
 from workers.dataset.verification import Problem
+from workers.dataset.writers import WRITING
 
 _DIGEST = ".sha256"
 

@@ -6,7 +6,8 @@ import json
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location
 from workers.dataset.object_path import ObjectPath
-from workers.dataset.publication import WRITING, is_dead, link, synchronise, temporary_file, writer
+from workers.dataset.publication import link, synchronise, temporary_file
+from workers.dataset.writers import WRITING, is_dead, writer
 
 MANIFEST = "dataset.json"
 

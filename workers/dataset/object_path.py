@@ -7,6 +7,10 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from workers.dataset.object_store import OPTIONS, Options, connection, is_found, reaching, require_bucket
+from workers.dataset.writers import WRITING, writer
+
+ONE_REQUEST = 10 << 20
+"""Bytes that PyArrow sends at once."""
 
 
 @dataclass(frozen=True)
@@ -137,14 +141,28 @@ class ObjectPath:
     def write_bytes(self, content: bytes) -> None:
         """Put the object there at once, in the place of what was there.
 
-        No `with`: PyArrow's stream publishes what was written so far even if the block fails. Here one call
-        hands over everything, and closing sends it: up to 10 MiB in one request, more as parts of which
-        nothing is seen before the last request joins them.
+        What does not fit in one request goes in parts, which PyArrow joins even if some of them were refused:
+        so it goes to a name of its writer's first, and one request copies it from there.
         """
+        if len(content) <= ONE_REQUEST:
+            self._upload(content)
+            return
+        aside = self.parent / WRITING / f"{self.name}.{writer()}"
+        try:
+            aside._upload(content)
+            with reaching(self):
+                self._store.copy_file(aside._place, self._place)
+        finally:
+            aside.unlink(missing_ok=True)
+
+    def _upload(self, content: bytes) -> None:
         with reaching(self):
             stream = self._store.open_output_stream(self._place)
-            stream.write(content)
-            stream.close()
+            try:
+                stream.write(content)
+                stream.close()
+            finally:
+                del stream  # one that failed ends here by joining its parts, before whoever called goes on
 
     def write_text(self, text: str) -> None:
         """The same for text, as UTF-8."""

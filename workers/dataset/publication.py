@@ -1,23 +1,17 @@
 """How a file comes to be, once and whole.
 
-On a disk it is written under its writer's name, then linked to its own. In an object store it is put there by
-one request, which leaves nothing if it fails; until then it exists in its writer's memory only.
+On a disk it is written under its writer's name, then linked to its own. In an object store it comes to its
+name by one request, which leaves nothing if it fails; until then it is in its writer's memory, or under its
+writer's name.
 """
 
 import os
-import re
-import socket
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from workers.dataset.location import Location
-
-WRITING = ".writing"
-"""Folder, below the dataset, of files that are not finished."""
-
-_WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)(?:_(?P<born>\d+))?")
+from workers.dataset.writers import WRITING, writer
 
 
 @contextmanager
@@ -76,77 +70,3 @@ def synchronise(path: Location) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def writer() -> str:
-    """The suffix of this process's temporary files: host, boot, process id, and start where Linux tells it.
-
-    Ids are given again, on a busy machine within minutes; no two processes share id and start.
-    """
-    pid = os.getpid()
-    born = _born(pid)
-    return f"{host()}.{_boot()}.{pid}{born and '_'}{born}"
-
-
-def host() -> str:
-    """This machine's name, as it stands in the names of unfinished files."""
-    return socket.gethostname().replace(".", "_")
-
-
-def is_dead(name: str) -> bool:
-    """Whether the file's name says that its writer is a process of this machine that lives no longer.
-
-    False for writers on other machines and for names without a writer: nobody here can tell.
-    """
-    match = _WRITER.fullmatch(name)
-    if match is None or match["host"] != host():
-        return False
-    return match["boot"] != _boot() or not _alive(int(match["pid"]), match["born"] or "")
-
-
-def wait_for_end(writers: Iterable[str], seconds: float) -> None:
-    """Wait until processes of this machine that were told to end have ended, or the time is over.
-
-    Args:
-        writers: what `writer` returned in them; those of other machines are not waited for.
-        seconds: the longest wait.
-    """
-    deadline = time.monotonic() + seconds
-    own = [name for name in writers if name.startswith(f"{host()}.")]
-    while time.monotonic() < deadline and not all(is_dead(name) for name in own):
-        time.sleep(0.02)
-
-
-def _alive(pid: int, born: str) -> bool:
-    """Whether the process that began then, if that is known, is still there.
-
-    One that has ended and only waits for its parent, which in a container may never ask, is not.
-    """
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass  # it is another user's, so it lives
-    state, begun = _state(pid)
-    return state != "Z" and begun in {"", born or begun}
-
-
-def _born(pid: int) -> str:
-    """When a process began, in ticks since the machine did; "" where nobody tells."""
-    return _state(pid)[1]
-
-
-def _state(pid: int) -> tuple[str, str]:
-    """A process's state, as a letter, and when it began; empty texts where nobody tells."""
-    try:
-        # The name, in brackets, may hold anything; the state follows it, and 19 further on the start.
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        return fields[0], fields[19]
-    except (OSError, IndexError):
-        return "", ""
-
-
-def _boot() -> str:
-    path = Path("/proc/sys/kernel/random/boot_id")
-    return path.read_text().strip() if path.exists() else "boot"

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workers.dataset.location import Location, fetched
-from workers.dataset.publication import WRITING, is_dead, link, move, synchronise, temporary_file
+from workers.dataset.publication import link, move, synchronise, temporary_file
+from workers.dataset.writers import WRITING, is_dead
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")
 _BLOCK = 1 << 20

@@ -13,8 +13,8 @@ import pytest
 from workers.dataset import schema, shards
 from workers.dataset.cache import require_space, training_cache
 from workers.dataset.folder import Dataset, create
-from workers.dataset.publication import writer
 from workers.dataset.shards import Shard
+from workers.dataset.writers import writer
 
 SANE = [index for index in range(20) if index % 7 != 3]
 

@@ -1,5 +1,6 @@
 """A dataset in an object store: the bytes, the promises and the refusals of one on a disk."""
 
+import math
 import signal
 import socket
 import subprocess
@@ -23,12 +24,12 @@ from workers.dataset.location import Location, location
 from workers.dataset.manifest import manifest_text
 from workers.dataset.numpy_export import export_npz
 from workers.dataset.object_store import StoreError, reaching
-from workers.dataset.publication import WRITING, writer
 from workers.dataset.replacement import REPLACED, Repair
 from workers.dataset.replacement import replace as put_right
 from workers.dataset.shards import Shard
 from workers.dataset.statistics import statistics
 from workers.dataset.verification import verify
+from workers.dataset.writers import WRITING, writer
 
 FIRST, MIDDLE, LAST = Shard(0, 8), Shard(8, 16), Shard(16, 20)
 
@@ -189,13 +190,35 @@ def test_an_upload_that_is_killed_half_way_leaves_nothing(size, object_store, bu
     assert content(seen) == {"file": b"whole"}
 
 
-class Relay:
-    """Passes bytes between clients and a server, and keeps all after the first `limit` of the clients."""
+@pytest.mark.parametrize("part", [1, 2])
+def test_an_upload_of_which_a_part_is_refused_leaves_nothing_and_can_be_repeated(part, object_store, bucket):
+    with Relay(object_store, refused=f"partNumber={part}&".encode()) as relay:
+        options = f"endpoint_override={relay.address}&region=us-east-1&scheme=http"
+        command = [sys.executable, "-c", UPLOAD, f"s3://{bucket}/data/file?{options}", "25000000"]
+        failed = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert failed.returncode == 1
+    assert "StoreError" in failed.stderr
+    seen = location(f"s3://{bucket}/data?endpoint_override={object_store}&region=us-east-1&scheme=http")
+    assert list(seen.iterdir()) == list((seen / WRITING).iterdir()) == []
+    (seen / "file").write_bytes(bytes(25_000_000))
+    assert [(path.name, path.stat().st_size) for path in seen.iterdir()] == [("file", 25_000_000)]
+    assert list((seen / WRITING).iterdir()) == []
 
-    def __init__(self, server: str, limit: int) -> None:
+
+REFUSAL = b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+
+
+class Relay:
+    """Passes bytes between clients and a server.
+
+    It keeps all after the first `limit` bytes of the clients, and refuses requests with some text in their
+    first line.
+    """
+
+    def __init__(self, server: str, limit: float = math.inf, refused: bytes = b"") -> None:
         host, port = server.split(":")
         self.is_half_way = threading.Event()
-        self._server, self._left = (host, int(port)), limit
+        self._server, self._left, self._refused = (host, int(port)), limit, refused
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._sockets = [self._listener]
         self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
@@ -223,6 +246,10 @@ class Relay:
         while not self.is_half_way.is_set():
             block = client.recv(1 << 16)
             if not block:
+                return
+            if self._refused and self._refused in block.partition(b"\r\n")[0]:
+                client.sendall(REFUSAL)
+                client.close()
                 return
             server.sendall(block)
             self._left -= len(block)

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers.dataset import schema, shards
-from workers.dataset.publication import WRITING, is_dead, wait_for_end, writer
 from workers.dataset.shards import Shard
+from workers.dataset.writers import WRITING, is_dead, wait_for_end, writer
 
 SHARD = Shard(8, 16)
 CONTENT = b"episodes " * 5000
