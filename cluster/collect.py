@@ -82,7 +82,9 @@ def foretell(
     actors = min(settings.actor_count(session.cpus), len(plan))
     pilot = plan[: max(PILOT_SHARDS, 2 * actors)]
     if len(pilot) < 2:
-        raise UserError(f"{_size(plan)} episodes are left to collect in {folder}: too few to plan for")
+        raise UserError(
+            f"{_size(plan)} episodes are left to collect in {folder}: too few to plan for; leave out --plan"
+        )
     session.preflight(actors)
     parameters = _parameters(identity, episodes, actors, settings)
     with tracker.run(f"plan {setup.name}", "plan", parameters) as run:
@@ -95,7 +97,7 @@ def foretell(
             )
         expected = forecast(reports, _size(plan), actors)
         begin(dataset, episodes, expected, tally)
-        say(described(expected, _size(pilot)))
+        say(described(expected, _size([report.shard for report in reports])))
         run.metrics(tally.metrics() | metrics(expected), step=tally.episodes)
 
 

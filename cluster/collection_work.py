@@ -106,8 +106,11 @@ def work(
 def _clean(dataset: Dataset, writers: list[str]) -> None:
     """Leave no unfinished file behind, however the work ended."""
     wait_for_end(writers, _ENDING_SECONDS)
-    shards.sweep(dataset.folder)
-    sweep_digests(dataset)
+    try:
+        shards.sweep(dataset.folder)
+        sweep_digests(dataset)
+    except OSError as error:  # a store that is away; how the work ended matters more
+        say(f"unfinished files may be left in {dataset.folder}, which the next collection removes: {error}")
 
 
 def _gather(

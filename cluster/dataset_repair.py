@@ -7,6 +7,8 @@ from cluster.options import setup_of
 from cluster.progress import ProgressLine, say
 from workers.collection import require_same_code
 from workers.dataset.folder import Dataset
+from workers.dataset.inventory import estranged
+from workers.dataset.manifest import MANIFEST
 from workers.dataset.shards import Shard
 from workers.dataset.verification import Problem
 from workers.rederivation import broken, drawn, rederive, repair
@@ -34,8 +36,16 @@ def repair_dataset(dataset: Dataset) -> None:
     """Put every broken or lost shard right, and say which.
 
     Raises:
-        UserError: this machine would roll out other episodes than the broken files shall hold.
+        UserError: this machine would roll out other episodes than the broken files shall hold, or it is
+            `dataset.json` that is wrong.
     """
+    differences = estranged(dataset)
+    if differences:
+        raise UserError(
+            f"no shard belongs to {dataset.folder / MANIFEST}; they differ in {'; '.join(differences)}. "
+            "Nothing is repaired: remove that file, and `svaedc collect` with the options of the shards "
+            "writes it anew"
+        )
     wrong = _broken(dataset)
     if not wrong:
         say(f"no file of {dataset.folder} is broken or lost: nothing to repair")

@@ -168,7 +168,10 @@ class Pool(Generic[Item, Result]):
 
     def _overdue(self) -> Iterator[Failed[Item]]:
         for member in self._crew.members:
-            if member.tasks and time.monotonic() - member.since > self._limits.seconds:
+            if not member.tasks or time.monotonic() - member.since <= self._limits.seconds:
+                continue
+            done, _ = ray.wait(list(member.tasks), num_returns=1, timeout=0)
+            if not done:  # else it was this process that stood still
                 slow = f"took longer than {self._limits.seconds:g} s"
                 yield from self._replace(member, slow, slow)
 

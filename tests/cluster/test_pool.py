@@ -145,6 +145,21 @@ def test_a_hung_worker_is_replaced_and_stalls_nothing(tmp_path):
     assert any(isinstance(result, Failed) and "longer than 4 s" in result.error for result in results)
 
 
+def test_work_that_was_done_while_the_driver_stood_still_is_not_overdue(tmp_path):
+    limits = Limits(in_flight=2, attempts=1, seconds=2.0)
+    actor = ray.remote(Worker).options(num_cpus=1)
+    results = []
+    with pool_of(lambda: actor.remote(tmp_path), 2, limits) as pool:
+        while len(pool.answers) < 2:
+            list(pool.run(["warms up-0"]))
+        for result in pool.run([f"works{index}-0" for index in range(6)]):
+            results.append(result)
+            if len(results) == 1:
+                time.sleep(3.0)
+    assert done(results) == [f"works{index}-0" for index in range(6)]
+    assert len(results) == 6
+
+
 def test_work_queued_behind_a_dead_worker_is_not_blamed(tmp_path):
     limits = Limits(in_flight=2, attempts=2, seconds=60.0)
     results = outcomes(tmp_path, ["dies-1", "works-0"], limits, size=1)

@@ -7,10 +7,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from cluster.dataset_repair import repair_dataset
+from cluster.errors import UserError
 from workers import setups
 from workers.collection import collect_shard, require_same_code, roll_out
 from workers.dataset import schema, shards
-from workers.dataset.folder import create, open_dataset
+from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import inventory, sweep_digests
 from workers.dataset.replacement import REPLACED, Repair
@@ -149,6 +151,32 @@ def test_a_changed_manifest_is_named(dataset):
     path = dataset.folder / "dataset.json"
     path.write_text(path.read_text().replace("\n", "\n ", 1))
     assert "dataset.json" in found(dataset)
+
+
+def test_a_manifest_that_no_shard_belongs_to_is_the_file_that_is_wrong(dataset):
+    manifest = dataset.folder / MANIFEST
+    kept, content = manifest.read_bytes(), {path.name for path in dataset.folder.iterdir()}
+    manifest.write_text(manifest.read_text().replace('"seed": 3', '"seed": 4'))
+    changed = open_dataset(dataset.folder)
+    [problem] = inventory(changed)
+    assert problem.file == MANIFEST
+    assert "no shard belongs to it; they differ in seed: 4 and 3. Remove it: `svaedc collect`" in problem.what
+    with pytest.raises(UserError, match=r"differ in seed: 4 and 3\. Nothing is repaired"):
+        repair_dataset(changed)
+    assert {path.name for path in dataset.folder.iterdir()} == content
+    manifest.unlink()
+    create(dataset.folder, dataset.identity)
+    assert manifest.read_bytes() == kept
+
+
+def test_a_shard_that_the_disk_does_not_read_is_kept_aside_and_recomputed(dataset, pristine):
+    dataset.path(MIDDLE).unlink()
+    dataset.path(MIDDLE).symlink_to("/proc/self/mem")
+    assert [shard for shard, is_broken in broken(dataset) if is_broken] == [MIDDLE]
+    assert repair(FRANKA, dataset, MIDDLE) is Repair.REPLACED
+    assert dataset.path(MIDDLE).read_bytes() == pristine.path(MIDDLE).read_bytes()
+    [aside] = (dataset.folder / REPLACED).iterdir()
+    assert aside.name == f"{MIDDLE.name}.unreadable"
 
 
 def test_digests_that_killed_writers_left_over_are_swept_and_those_of_writers_are_not(dataset):

@@ -12,7 +12,7 @@ from workers.dataset import shards
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location, fetched
 from workers.dataset.manifest import MANIFEST, begun, manifest_text
-from workers.dataset.schema import Columns, Outcomes, read, read_outcomes, read_stops
+from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
 from workers.rollout import DIVERGED, Episode
 
@@ -126,6 +126,7 @@ def create(folder: Location, identity: Identity) -> Dataset:
         ValueError: when the folder holds a dataset of another identity, naming the fields that differ.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    _require_own_shards(folder, identity)
     dataset = _opened(folder, begun(folder, manifest_text(identity)))
     differences = dataset.identity.differences(identity)
     if differences:
@@ -135,6 +136,20 @@ def create(folder: Location, identity: Identity) -> Dataset:
             + ". Choose another folder, or ask for the same"
         )
     return dataset
+
+
+def _require_own_shards(folder: Location, identity: Identity) -> None:
+    """Refuse shards of another dataset where the manifest is lost; it is written anew beside its own."""
+    if (folder / MANIFEST).exists():
+        return
+    for shard in shards.present(folder)[:1]:
+        differences = read_identity(folder / shard.name).differences(identity)
+        if differences:
+            raise ValueError(
+                f"{folder} has lost its {MANIFEST}, and {shard.name} in it and what was asked for differ in "
+                + "; ".join(differences)
+                + f". Ask for what the file holds, which writes {MANIFEST} anew, or choose another folder"
+            )
 
 
 def open_dataset(folder: Location) -> Dataset:
@@ -153,4 +168,7 @@ def _opened(folder: Location, manifest: bytes) -> Dataset:
     try:
         return Dataset(folder, Identity.from_json(manifest.decode()))
     except ValueError as error:
-        raise ValueError(f"{folder / MANIFEST} is damaged or of another version: {error}") from error
+        raise ValueError(
+            f"{folder / MANIFEST} is damaged or of another version: {error}. If it is damaged, remove it: "
+            "`svaedc collect` with the options of its shards writes it anew"
+        ) from error

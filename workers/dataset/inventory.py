@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from workers.dataset.folder import Dataset
 from workers.dataset.location import Location, files
 from workers.dataset.manifest import MANIFEST, manifest_text
+from workers.dataset.schema import read_identity
 from workers.dataset.shards import Shard, missing, named, recorded_digest, sha256
 from workers.dataset.verification import Problem
 from workers.dataset.writers import WRITING
@@ -22,6 +23,20 @@ def inventory(dataset: Dataset) -> Iterator[Problem]:
         yield Problem(shard.name, "it is missing: only its .sha256 file is there")
     for shard in left_over(dataset):
         yield Problem(shard.name + _DIGEST, "it is left over: the episodes of its shard are in other files")
+
+
+def estranged(dataset: Dataset) -> list[str]:
+    """What `dataset.json` and the shards differ in, if no shard is of it: it was changed, and not they."""
+    found: list[str] = []
+    for shard in dataset.shards():
+        try:
+            differences = dataset.identity.differences(read_identity(dataset.path(shard)))
+        except (ValueError, OSError):
+            continue  # a broken file says nothing, and is named elsewhere
+        if not differences:
+            return []
+        found = found or list(differences)
+    return found
 
 
 def lost(dataset: Dataset) -> list[Shard]:
@@ -54,6 +69,13 @@ def sweep_digests(dataset: Dataset) -> int:
 def _manifest_problems(dataset: Dataset) -> Iterator[Problem]:
     if (dataset.folder / MANIFEST).read_text() != manifest_text(dataset.identity):
         yield Problem(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
+    differences = estranged(dataset)
+    if differences:
+        yield Problem(
+            MANIFEST,
+            f"no shard belongs to it; they differ in {'; '.join(differences)}. Remove it: `svaedc collect` "
+            "with the options of the shards writes it anew",
+        )
 
 
 def _whose(dataset: Dataset, path: Location) -> str:

@@ -43,12 +43,19 @@ def irreducible(dataset: Dataset) -> Irreducible | None:
     repeats = dataset.identity.repeats
     if repeats < 2:
         raise ValueError(f"{dataset.folder} must hold repeats of its controllers, got repeats = {repeats}")
-    parts = [dataset.outcomes(shard) for shard in dataset.shards()]
-    episode = [index for part in parts for index in part.episode.tolist()]
-    rows = _whole(episode, [stop for part in parts for stop in part.stop], repeats)
+    episode: list[int] = []
+    stop: list[str] = []
+    all_y, all_f = [], []
+    for shard in dataset.shards():
+        outcomes = dataset.outcomes(shard)
+        episode += outcomes.episode.tolist()
+        stop += outcomes.stop
+        all_y.append(outcomes.y)
+        all_f.append(outcomes.f)
+    rows = _whole(episode, stop, repeats)
     if len(rows) < 2:
         return None
-    y, f = (np.concatenate([getattr(part, name) for part in parts])[rows] for name in ("y", "f"))
+    y, f = (np.concatenate(values)[rows] for values in (all_y, all_f))
     xi = error_bounds(_trajectories(dataset))
     return Irreducible(len(rows), share(y.astype(np.float64)), share(f.astype(np.float64)), xi)
 

@@ -5,6 +5,7 @@ from enum import Enum
 from pathlib import Path
 
 from workers.dataset.location import Location
+from workers.dataset.object_store import StoreError
 from workers.dataset.publication import link, move, synchronise, temporary_file
 from workers.dataset.shards import Shard, digest_line, digest_path, sha256
 
@@ -39,7 +40,7 @@ def replace(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Re
         synchronise(temporary)
         digest = sha256(temporary)
         is_there = target.exists()
-        if is_there and sha256(target) == digest:
+        if is_there and _readable_digest(target) == digest:
             _write_digest(folder, shard, digest)
             return Repair.DIGEST
         if is_there:
@@ -51,12 +52,24 @@ def replace(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Re
 
 
 def keep_aside(folder: Location, path: Location) -> Location:
-    """Give a file a second name in `.replaced`, with the start of its SHA-256; equal bytes are kept once."""
+    """Give a file a second name in `.replaced`, with the start of its SHA-256; equal bytes are kept once.
+
+    One that the disk no longer reads has no SHA-256, and is called unreadable.
+    """
     aside = folder / REPLACED
     aside.mkdir(exist_ok=True)
-    kept = aside / f"{path.name}.{sha256(path)[:12]}"
+    kept = aside / f"{path.name}.{_readable_digest(path)[:12]}"
     link(path, kept)
     return kept
+
+
+def _readable_digest(path: Location) -> str:
+    try:
+        return sha256(path)
+    except StoreError:
+        raise
+    except OSError:
+        return "unreadable"
 
 
 def _write_digest(folder: Location, shard: Shard, digest: str) -> None:

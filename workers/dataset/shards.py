@@ -47,7 +47,7 @@ def present(folder: Location) -> list[Shard]:
 def named(name: str) -> Iterator[Shard]:
     """The shard that a file name stands for; none for a name of another kind."""
     match = _NAME.fullmatch(name)
-    if match:
+    if match and int(match[1]) < int(match[2]):
         yield Shard(int(match[1]), int(match[2]))
 
 

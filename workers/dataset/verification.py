@@ -10,6 +10,7 @@ from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location, fetched
+from workers.dataset.object_store import StoreError
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
@@ -50,9 +51,14 @@ def overlaps(dataset: Dataset) -> list[Problem]:
 
 def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
     """What is wrong with a shard in itself, whatever lies beside it."""
-    path = fetched(dataset.path(shard))
-    found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
-    return [Problem(shard.name, what) for what in found]
+    try:
+        path = fetched(dataset.path(shard))
+        found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
+        return [Problem(shard.name, what) for what in found]
+    except StoreError:
+        raise  # the store is away, which is no fault of a shard
+    except OSError as error:
+        return [Problem(shard.name, f"it cannot be read: {error.strerror}")]
 
 
 def gaps(dataset: Dataset) -> Iterator[Shard]:

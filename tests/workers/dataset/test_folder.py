@@ -61,6 +61,17 @@ def test_a_damaged_manifest_is_refused_by_name(tmp_path, content):
         open_dataset(tmp_path)
 
 
+def test_a_lost_manifest_is_written_anew_for_what_the_shards_hold_and_for_nothing_else(dataset, identity):
+    manifest = dataset.folder / MANIFEST
+    content = manifest.read_bytes()
+    manifest.unlink()
+    with pytest.raises(ValueError, match=r"lost its dataset\.json, and episodes-.* differ in seed: 5 and 6"):
+        create(dataset.folder, replace(identity, seed=6))
+    assert not manifest.exists()
+    assert create(dataset.folder, identity) == dataset
+    assert manifest.read_bytes() == content
+
+
 def test_a_manifest_of_a_later_version_is_refused(dataset):
     path = dataset.folder / MANIFEST
     path.write_text(json.dumps(json.loads(path.read_text()) | {"compression": "int16"}))

@@ -7,6 +7,7 @@ import pytest
 
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
+from workers.dataset.inventory import inventory
 from workers.dataset.shards import Shard
 from workers.dataset.verification import gaps, verify
 
@@ -62,6 +63,22 @@ def test_a_flipped_byte_is_named(dataset, place):
 def test_a_missing_digest_is_named(dataset):
     shards.digest_path(dataset.folder, MIDDLE).unlink()
     assert _problems(dataset) == {MIDDLE.name: "its .sha256 file is missing"}
+
+
+def test_a_shard_that_the_disk_does_not_read_is_named_and_the_others_are_checked(dataset):
+    first, *others = dataset.shards()
+    dataset.path(first).unlink()
+    dataset.path(first).symlink_to("/proc/self/mem")  # whose first page gives EIO, as a bad sector does
+    found = {shard: [problem.what for problem in problems] for shard, problems in verify(dataset)}
+    assert found == {first: ["it cannot be read: Input/output error"], **{shard: [] for shard in others}}
+
+
+def test_a_file_whose_name_counts_backwards_is_no_shard(dataset):
+    (dataset.folder / "episodes-000000512-000000512.parquet").write_bytes(b"stray")
+    assert all(not problems for _, problems in verify(dataset))
+    assert [problem.what for problem in inventory(dataset)] == [
+        "no shard has such a name, and its bytes are those of no shard here"
+    ]
 
 
 def test_a_gap_is_nobodys_fault(dataset):
