@@ -10,7 +10,8 @@ from typing import Final
 
 from cluster.recipe import THIRTY, Panel, Recipe
 from svaedc.claims import Claim
-from svaedc.evidence import Gain, Like, MedianGap, NoBetter, Steadier, Successes
+from svaedc.evidence import MedianGap, Steadier, Successes
+from svaedc.paired_evidence import Gain, Like, NoBetter
 
 _PAPERS = ("random", "se", "bbk-kl", "svae", "svae-dc")
 _CONTROLS = ("screened-random", "screened-svae", "botorch")

@@ -1,12 +1,12 @@
 """Numbers that decide what a paper claims of its methods, taken from comparisons, each with a verdict."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol, runtime_checkable
 
 from svaedc.intervals import Estimate, ratio
-from svaedc.summaries import Difference, MethodSummary, Summary
+from svaedc.summaries import MethodSummary, Summary
 
 Verdict = Literal["holds", "does not hold", "open", "not measured"]
 Panels = Mapping[str, Summary]
@@ -50,96 +50,6 @@ class Evidence(Protocol):
     def found(self, panels: Panels, initial: int) -> Finding:
         """The number in these comparisons, whose runs began with so many shared random trials."""
         ...
-
-
-@dataclass(frozen=True)
-class Gain:
-    """A method's best objective so far minus a baseline's, over shared seeds, lies in a range.
-
-    Attributes:
-        panel: Name of the panel.
-        method: The one that gains.
-        baseline: The other one.
-        after: Suggested trials.
-        low: Smallest gain that agrees with the claim; 0 says that the method is better.
-        high: Largest gain.
-    """
-
-    panel: str
-    method: str
-    baseline: str
-    after: int
-    low: float = 0.0
-    high: float = math.inf
-
-    @property
-    def measure(self) -> str:
-        """Method minus baseline, and the end of the range that is not 0."""
-        most = f" ≤ {self.high:g}" if self.high < math.inf else ""
-        return f"{self.method} − {self.baseline}{most}, best after {self.after}"
-
-    def found(self, panels: Panels, initial: int) -> Finding:
-        """Holds if the whole interval of the paired difference lies in the range, fails if none of it."""
-        return _judged(self, panels, initial, self._verdict)
-
-    def _verdict(self, value: Estimate) -> Verdict:
-        if self.low < value.low and value.high < self.high:
-            return "holds"
-        return "does not hold" if value.high < self.low or self.high < value.low else "open"
-
-
-@dataclass(frozen=True)
-class Like:
-    """A method's best objective so far is not told apart from a baseline's, over shared seeds.
-
-    Few runs tell hardly anything apart, so a claim of this kind means as much as the interval is narrow.
-
-    Attributes:
-        panel: Name of the panel.
-        method: One.
-        baseline: The other one.
-        after: Suggested trials.
-    """
-
-    panel: str
-    method: str
-    baseline: str
-    after: int
-
-    @property
-    def measure(self) -> str:
-        """Method minus baseline, which is said to be 0."""
-        return f"{self.method} − {self.baseline} ≈ 0, best after {self.after}"
-
-    def found(self, panels: Panels, initial: int) -> Finding:
-        """Holds if the interval of the paired difference includes 0."""
-        return _judged(self, panels, initial, _includes_zero)
-
-
-@dataclass(frozen=True)
-class NoBetter:
-    """A method's best objective so far is not above a baseline's, over shared seeds; it may be below.
-
-    Attributes:
-        panel: Name of the panel.
-        method: The one that does not gain.
-        baseline: The other one.
-        after: Suggested trials.
-    """
-
-    panel: str
-    method: str
-    baseline: str
-    after: int
-
-    @property
-    def measure(self) -> str:
-        """Method minus baseline, which is said not to be above 0."""
-        return f"{self.method} − {self.baseline} ≤ 0, best after {self.after}"
-
-    def found(self, panels: Panels, initial: int) -> Finding:
-        """Holds unless the whole interval of the paired difference is above 0."""
-        return _judged(self, panels, initial, _not_above_zero)
 
 
 @dataclass(frozen=True)
@@ -244,32 +154,6 @@ class Steadier:
         return Finding(value, counts[0], verdict)
 
 
-def _judged(
-    evidence: Gain | Like | NoBetter, panels: Panels, initial: int, verdict: Callable[[Estimate], Verdict]
-) -> Finding:
-    difference = _difference(panels.get(evidence.panel), evidence.method, evidence.baseline)
-    index = initial + evidence.after - 1
-    if difference is None or not difference.runs or index >= len(difference.best):
-        return UNKNOWN
-    value = difference.best[index]
-    # One run has no interval.
-    return Finding(value, difference.runs, "open" if math.isnan(value.low) else verdict(value))
-
-
 def _method(summary: Summary | None, method: str) -> MethodSummary | None:
     found = summary.methods.get(method) if summary else None
     return found if found and found.runs else None
-
-
-def _difference(summary: Summary | None, method: str, baseline: str) -> Difference | None:
-    differences = summary.differences if summary else ()
-    wanted = (method, baseline)
-    return next((each for each in differences if (each.method, each.baseline) == wanted), None)
-
-
-def _includes_zero(value: Estimate) -> Verdict:
-    return "holds" if value.low <= 0 <= value.high else "does not hold"
-
-
-def _not_above_zero(value: Estimate) -> Verdict:
-    return "does not hold" if value.low > 0 else "holds"

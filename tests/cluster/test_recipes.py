@@ -8,7 +8,8 @@ from cluster.recipes import RECIPES, recipe
 from cluster.scales import SCALES, scale
 from svaedc import methods
 from svaedc.claims import Claim
-from svaedc.evidence import Gain, MedianGap
+from svaedc.evidence import MedianGap
+from svaedc.paired_evidence import Gain
 from svaedc.variants import LATENT_SIZES
 from workers import setups
 from workers.hardware import robots

@@ -24,8 +24,9 @@ from cluster.tracking import open_tracker
 from svaedc import checkpoint
 from svaedc.claims import Claim
 from svaedc.comparison import Trial
-from svaedc.evidence import Gain, Successes
+from svaedc.evidence import Successes
 from svaedc.model import SvaeDc
+from svaedc.paired_evidence import Gain
 from svaedc.presets import Sizes, compact
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from svaedc.claims import Claim
-from svaedc.evidence import Evidence, Gain, Like, MedianGap, NoBetter, Steadier, Successes
+from svaedc.evidence import Evidence, MedianGap, Steadier, Successes
+from svaedc.paired_evidence import Gain, Like, NoBetter
 from svaedc.statistics import summarise
 from svaedc.summaries import Reporting, Row
 
