@@ -60,8 +60,10 @@ class ComparisonJob:
 
     def require(self, names: Sequence[str], setup: Setup) -> None:
         """Refuse what every run of one of these methods would fail of, with a `ValueError`."""
+        neediest = max(names, key=methods.needs_model)
+        problem = self._problem(RunKey(neediest, 0), setup)  # holds what the others need as well
         for name in names:
-            methods.require(name, self._problem(RunKey(name, 0), setup), self.trials)
+            methods.require(name, problem, self.trials)
 
     def run(self, key: RunKey, setup: Setup, environment: Environment) -> Iterator[Trial]:
         """The missing trials of a run; each is on disk before it is yielded."""

@@ -16,6 +16,7 @@ from cluster.progress import ProgressLine
 from studies.cells import table
 from workers.dataset.folder import Dataset, open_dataset
 from workers.dataset.location import location
+from workers.dataset.statistics import bad_steps
 
 HELD_OUT = 0.1
 EPOCHS, BATCH, WIDTH = 48, 128, 128
@@ -30,16 +31,10 @@ def measured(dataset: Dataset) -> tuple[Float32[np.ndarray, "n D"], dict[str, Fl
             x.append(columns.x)
             y.append(columns.y)
             f.append(columns.f)
-            shares.append(_shares(columns.bad, len(dataset.identity.conditions)))
+            shares.append(bad_steps(columns.bad, len(dataset.identity.conditions)) / dataset.identity.horizon)
             progress.advance(shard.episodes, "")
     conditions = dict(zip(dataset.identity.conditions, np.concatenate(shares).T, strict=True))
     return np.concatenate(x), {**conditions, "y": np.concatenate(y), "f": np.concatenate(f)}
-
-
-def _shares(bad: np.ndarray, conditions: int) -> Float[np.ndarray, "n conditions"]:
-    if bad.dtype == np.float32:  # a graded G_bad, which is one condition
-        return bad.mean(axis=1, keepdims=True)
-    return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).mean(axis=1)
 
 
 def told(

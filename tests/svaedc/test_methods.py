@@ -63,8 +63,14 @@ def test_a_pool_that_would_run_dry_is_refused_before_the_first_trial(name):
 
 
 @pytest.mark.parametrize("name", ["random", "botorch", "svae-dc-acqf"])
-def test_a_method_that_searches_the_cube_never_runs_dry(name):
-    methods.require(name, problem(3, 10, 0), 1_000)
+def test_a_method_that_searches_the_cube_suggests_more_controllers_than_its_pool_has(name):
+    given, history = problem(3, 1, 0), History.empty(3)
+    methods.require(name, given, 4)
+    method = methods.build(name, given)
+    for index in range(4):
+        x = method.suggest(history, np.random.default_rng(index))
+        history = history.append(x, quadratic(x))
+    assert len(np.unique(history.x, axis=0)) == 4
 
 
 def test_compression_spends_fewer_trials_on_controllers_predicted_bad():

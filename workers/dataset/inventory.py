@@ -6,7 +6,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.location import Location, files
 from workers.dataset.manifest import MANIFEST, manifest_text
 from workers.dataset.schema import read_identity
-from workers.dataset.shards import Shard, missing, named, recorded_digest, sha256
+from workers.dataset.shards import Shard, missing, named, readable_sha256, recorded_digest
 from workers.dataset.verification import Problem
 from workers.dataset.writers import WRITING
 
@@ -31,7 +31,7 @@ def estranged(dataset: Dataset) -> list[str]:
     for shard in dataset.shards():
         try:
             differences = dataset.identity.differences(read_identity(dataset.path(shard)))
-        except (ValueError, OSError):
+        except ValueError:
             continue  # a broken file says nothing, and is named elsewhere
         if not differences:
             return []
@@ -80,7 +80,7 @@ def _manifest_problems(dataset: Dataset) -> Iterator[Problem]:
 
 def _whose(dataset: Dataset, path: Location) -> str:
     """Whether a strange file is a copy; readers of all Parquet files would see its episodes as well."""
-    digest = sha256(path)
+    digest = readable_sha256(path)
     for shard in dataset.shards():
         if recorded_digest(dataset.folder, shard) == digest:
             return f"and its bytes are a copy of {shard.name}"

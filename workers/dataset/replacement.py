@@ -5,9 +5,8 @@ from enum import Enum
 from pathlib import Path
 
 from workers.dataset.location import Location
-from workers.dataset.object_store import StoreError
 from workers.dataset.publication import link, move, synchronise, temporary_file
-from workers.dataset.shards import Shard, digest_line, digest_path, sha256
+from workers.dataset.shards import Shard, digest_line, digest_path, readable_sha256, sha256
 
 REPLACED = ".replaced"
 """Folder, below the dataset, of what stood in a shard's place; readers of Parquet folders skip its name."""
@@ -40,7 +39,7 @@ def replace(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Re
         synchronise(temporary)
         digest = sha256(temporary)
         is_there = target.exists()
-        if is_there and _readable_digest(target) == digest:
+        if is_there and readable_sha256(target) == digest:
             _write_digest(folder, shard, digest)
             return Repair.DIGEST
         if is_there:
@@ -58,18 +57,9 @@ def keep_aside(folder: Location, path: Location) -> Location:
     """
     aside = folder / REPLACED
     aside.mkdir(exist_ok=True)
-    kept = aside / f"{path.name}.{_readable_digest(path)[:12]}"
+    kept = aside / f"{path.name}.{readable_sha256(path)[:12]}"
     link(path, kept)
     return kept
-
-
-def _readable_digest(path: Location) -> str:
-    try:
-        return sha256(path)
-    except StoreError:
-        raise
-    except OSError:
-        return "unreadable"
 
 
 def _write_digest(folder: Location, shard: Shard, digest: str) -> None:

@@ -8,12 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workers.dataset.location import Location, fetched
+from workers.dataset.object_store import StoreError
 from workers.dataset.publication import link, move, synchronise, temporary_file
 from workers.dataset.writers import WRITING, is_dead
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")
 _BLOCK = 1 << 20
 _READERS = 8
+
+UNREADABLE = "unreadable"
+"""In the place of a digest."""
 
 
 @dataclass(frozen=True, order=True)
@@ -119,6 +123,16 @@ def sha256(path: Location) -> str:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
+
+
+def readable_sha256(path: Location) -> str:
+    """The same, or `UNREADABLE` where the disk does not give the bytes; a store that is away raises."""
+    try:
+        return sha256(path)
+    except StoreError:
+        raise
+    except OSError:
+        return UNREADABLE
 
 
 def sweep(folder: Location) -> int:

@@ -47,7 +47,7 @@ def statistics(dataset: Dataset) -> Statistics:
         objectives.append(outcomes.f)
         badness += float(outcomes.y.sum(dtype=np.float64))
         stops.update(outcomes.stop)
-        bad += _total(outcomes.bad, len(bad))
+        bad += bad_steps(outcomes.bad, len(bad)).sum(axis=0)
         steps += outcomes.bad.size
     if not objectives:
         raise ValueError(f"{dataset.folder} holds no episodes yet; collect some first")
@@ -61,8 +61,8 @@ def statistics(dataset: Dataset) -> Statistics:
     )
 
 
-def _total(bad: Bad, conditions: int) -> Float64[np.ndarray, " conditions"]:
-    """Bad steps of every condition; of a graded G_bad, the sum of its degrees."""
+def bad_steps(bad: Bad, conditions: int) -> Float64[np.ndarray, "n conditions"]:
+    """Bad steps of every condition in each episode; of a graded G_bad, the sum of its degrees."""
     if bad.dtype == np.float32:
-        return np.array([bad.sum(dtype=np.float64)])
-    return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).sum(axis=(0, 1), dtype=np.float64)
+        return bad.sum(axis=1, keepdims=True, dtype=np.float64)
+    return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).sum(axis=1, dtype=np.float64)

@@ -10,7 +10,6 @@ from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.location import Location, fetched
-from workers.dataset.object_store import StoreError
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.physics import PhysicsRanges
@@ -51,14 +50,9 @@ def overlaps(dataset: Dataset) -> list[Problem]:
 
 def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
     """What is wrong with a shard in itself, whatever lies beside it."""
-    try:
-        path = fetched(dataset.path(shard))
-        found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
-        return [Problem(shard.name, what) for what in found]
-    except StoreError:
-        raise  # the store is away, which is no fault of a shard
-    except OSError as error:
-        return [Problem(shard.name, f"it cannot be read: {error.strerror}")]
+    path = fetched(dataset.path(shard))
+    found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
+    return [Problem(shard.name, what) for what in found]
 
 
 def gaps(dataset: Dataset) -> Iterator[Shard]:
@@ -76,7 +70,10 @@ def _byte_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[s
     if not recorded:
         yield "its .sha256 file is missing"
         return
-    if shards.sha256(path) != recorded:
+    held = shards.readable_sha256(path)
+    if held == shards.UNREADABLE:
+        yield "the disk does not read it"
+    elif held != recorded:
         yield "its bytes differ from its .sha256 file"
     elif digest_path.read_text(errors="replace") != shards.digest_line(shard, recorded):
         yield "its .sha256 file is not as `sha256sum` writes it"

@@ -10,17 +10,19 @@ from pathlib import Path
 WRITING = ".writing"
 """Folder, below the dataset, of files that are not finished."""
 
-_WRITER = re.compile(r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^.]+)\.(?P<pid>\d+)(?:_(?P<born>\d+))?")
+_WRITER = re.compile(
+    r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^._]+)(?:_(?P<ids>\d+))?\.(?P<pid>\d+)(?:_(?P<born>\d+))?"
+)
 
 
 def writer() -> str:
-    """The suffix of this process's temporary files: host, boot, process id, and start where Linux tells it.
+    """The suffix of this process's temporary files: its place, its id, and its start where Linux tells it.
 
     Ids are given again, on a busy machine within minutes; no two processes share id and start.
     """
     pid = os.getpid()
     born = _born(pid)
-    return f"{host()}.{_boot()}.{pid}{born and '_'}{born}"
+    return f"{_place()}.{pid}{born and '_'}{born}"
 
 
 def host() -> str:
@@ -31,23 +33,27 @@ def host() -> str:
 def is_dead(name: str) -> bool:
     """Whether the file's name says that its writer is a process of this machine that lives no longer.
 
-    False for writers on other machines and for names without a writer: nobody here can tell.
+    False for writers on other machines, or in other containers of this one, and for names without a writer:
+    nobody here can tell.
     """
     match = _WRITER.fullmatch(name)
     if match is None or match["host"] != host():
         return False
-    return match["boot"] != _boot() or not _alive(int(match["pid"]), match["born"] or "")
+    if match["boot"] != _boot():
+        return True
+    is_known_here = match["ids"] in {None, _ids()}
+    return is_known_here and not _alive(int(match["pid"]), match["born"] or "")
 
 
 def wait_for_end(writers: Iterable[str], seconds: float) -> None:
     """Wait until processes of this machine that were told to end have ended, or the time is over.
 
     Args:
-        writers: what `writer` returned in them; those of other machines are not waited for.
+        writers: what `writer` returned in them; those whose ids are not known here are not waited for.
         seconds: the longest wait.
     """
     deadline = time.monotonic() + seconds
-    own = [name for name in writers if name.startswith(f"{host()}.")]
+    own = [name for name in writers if name.startswith(f"{_place()}.")]
     while time.monotonic() < deadline and not all(is_dead(name) for name in own):
         time.sleep(0.02)
 
@@ -82,8 +88,18 @@ def _state(pid: int) -> tuple[str, str]:
         return "", ""
 
 
+def _place() -> str:
+    """What process ids are unique in: the machine, since its start, in a container."""
+    ids = _ids()
+    return f"{host()}.{_boot()}{ids and '_'}{ids}"
+
+
 def _boot() -> str:
-    """This start of the machine, and where Linux has several, the name space that process ids are of."""
-    path, ids = Path("/proc/sys/kernel/random/boot_id"), Path("/proc/self/ns/pid")
-    boot = path.read_text().strip() if path.exists() else "boot"
-    return f"{boot}-{ids.stat().st_ino}" if ids.exists() else boot
+    path = Path("/proc/sys/kernel/random/boot_id")
+    return path.read_text().strip() if path.exists() else "boot"
+
+
+def _ids() -> str:
+    """The name space that process ids are of; "" where nobody tells."""
+    path = Path("/proc/self/ns/pid")
+    return str(path.stat().st_ino) if path.exists() else ""

@@ -184,11 +184,14 @@ def test_sweeping_spares_living_writers_and_those_of_other_machines(tmp_path):
         f"{SHARD.name}.{writer()}",
         f"{SHARD.name}.{host}.{boot}.{os.getppid()}",
         f"{SHARD.name}.elsewhere.{boot}.{gone.pid}",
+        f"{SHARD.name}.{host}.{boot.partition('_')[0]}_1.{gone.pid}",  # in another container of this machine
         "somebody's notes",
     ]
     dead = [
         f"{SHARD.name}.{host}.{boot}.{gone.pid}",
         f"{SHARD.name}.{host}.another-boot.{os.getpid()}",
+        f"{SHARD.name}.{host}.another-boot_1.{os.getpid()}",
+        f"{SHARD.name}.{host}.{boot.partition('_')[0]}.{gone.pid}",  # where nobody tells of containers
         f"{SHARD.name}.{host}.{boot}.{os.getpid()}_1",  # of a process that had this one's id before it
     ]
     for name in (*living, *dead):
