@@ -16,11 +16,11 @@ from functools import partial
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
 
-from cluster.collection_work import rollout_pool
 from cluster.config import CollectSettings, RaySettings
-from cluster.session import connect
+from cluster.datasets.gather import rollout_pool
+from cluster.runtime.session import connect
 from workers import setups
-from workers.collection import roll_out
+from workers.collection.shard import roll_out
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard

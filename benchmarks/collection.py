@@ -17,9 +17,9 @@ from pathlib import Path
 
 import psutil
 
-from cluster.collect import collect
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
-from cluster.session import connect
+from cluster.datasets.collect import collect
+from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
 from workers import setups
 

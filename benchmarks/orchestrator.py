@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from cluster.collect import collect
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
-from cluster.rollout_actor import RolloutActor
-from cluster.session import connect
+from cluster.datasets.collect import collect
+from cluster.datasets.worker import RolloutActor
+from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
 from workers import setups
-from workers.collection import ShardReport, collect_shard
+from workers.collection.shard import ShardReport, collect_shard
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard
 from workers.rollout import Episode

@@ -18,12 +18,12 @@ from typing import Any
 
 import torch
 
-from cluster.comparison_job import ComparisonJob
-from cluster.comparison_runs import Standing, Watch, submit
+from cluster.comparison.records import RunKey
+from cluster.comparison.tune import Standing, Watch, submit
+from cluster.comparison.worker import ComparisonJob
 from cluster.config import RaySettings
 from cluster.progress import ProgressLine
-from cluster.results import RunKey
-from cluster.session import connect
+from cluster.runtime.session import connect
 from workers import setups
 
 METHOD = "se"

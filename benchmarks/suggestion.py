@@ -11,15 +11,15 @@ from time import process_time
 import numpy as np
 import torch
 
-from svaedc import methods
-from svaedc.adjustment import Adjustable
-from svaedc.candidates import Problem
-from svaedc.densities import Densities
-from svaedc.features import Latents
-from svaedc.history import History
-from svaedc.methods import Method
-from svaedc.model import SvaeDc
-from svaedc.presets import Sizes, compact
+from svaedc.bo import methods
+from svaedc.bo.candidates import Problem
+from svaedc.bo.distribution_features import Densities
+from svaedc.bo.features import Latents
+from svaedc.bo.history import History
+from svaedc.bo.methods import Method
+from svaedc.bo.online import Adjustable
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import Sizes, compact
 
 DIMENSIONS, OBSERVATIONS, STEPS = 48, 25, 100
 REFERENCE = "botorch"

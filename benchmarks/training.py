@@ -22,16 +22,16 @@ from ray.train import RunConfig, ScalingConfig
 from ray.train.torch import TorchTrainer
 from torch import nn
 
-from cluster.collect import collect
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
-from cluster.session import connect
+from cluster.datasets.collect import collect
+from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
-from cluster.training_job import TrainingJob, episodes, trained
-from svaedc.episodes import Batch, Episodes, split
-from svaedc.model import initialised
-from svaedc.presets import Sizes, compact, paper
-from svaedc.stages import Objective
-from svaedc.training import fit
+from cluster.training.worker import TrainingJob, episodes, trained
+from svaedc.data.episodes import Batch, Episodes, split
+from svaedc.model.svae_dc import initialised
+from svaedc.training.loop import fit
+from svaedc.training.objectives import Objective
+from svaedc.training.presets import Sizes, compact, paper
 from workers import setups
 
 COUNT, D, OBSERVATIONS = 2_000, 48, 25

@@ -5,18 +5,17 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from cluster.collect import collect
-from cluster.compare import Comparison, compare
-from cluster.comparison_plan import planned
+from cluster.comparison.compare import Comparison, compare
+from cluster.comparison.plan import Grid, planned
 from cluster.config import Settings
-from cluster.grid import Grid
-from cluster.placement import free_machines
+from cluster.datasets.collect import collect
 from cluster.progress import say, timed
-from cluster.session import Session
+from cluster.runtime.placement import free_machines
+from cluster.runtime.session import Session
 from cluster.tracking import Tracker
-from cluster.train import MINIMUM_EPISODES, train
-from cluster.training_submission import placed
-from svaedc.summaries import Difference
+from cluster.training.launch import placed
+from cluster.training.train import MINIMUM_EPISODES, train
+from svaedc.analysis.summary import Difference
 from workers import setups
 
 SETUP = "franka"

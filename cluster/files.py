@@ -1,10 +1,15 @@
 """Files that appear whole: written beside their place, then moved there."""
 
+import fcntl
+import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from workers.dataset.publication import synchronise
+from cluster.errors import UserError
+from workers.dataset.storage.atomic import synchronise
 
 
 @contextmanager
@@ -21,3 +26,43 @@ def replacing(path: Path) -> Iterator[Path]:
         synchronise(path.parent)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def alone_in(folder: Path, refusal: str) -> Iterator[None]:
+    """Keeps other commands of this machine out of an existing folder for as long as the block lasts.
+
+    The kernel holds the lock for this process's descriptor of the folder, which no other program that it
+    starts inherits: it ends with the process, however that ends, and leaves no file behind.
+
+    Args:
+        folder: that is locked; what is below it is not.
+        refusal: what another command is told meanwhile, with the remedy.
+
+    Raises:
+        UserError: another command works in the folder.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UserError(refusal) from error
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a file as a whole; what was there stays when there is no room."""
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=2) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """What `write_json` wrote; nothing where there is none, or a damaged one that can be made again."""
+    try:
+        content = json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}

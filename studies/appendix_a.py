@@ -17,8 +17,8 @@ from torch import Tensor, nn
 
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
-from svaedc.distributions import FAMILIES, Diagonal
-from svaedc.model import SvaeDc
+from svaedc.model.distributions import FAMILIES, Diagonal
+from svaedc.model.svae_dc import SvaeDc
 
 SECONDS_PER_UPDATE = {"compact": 0.045, "paper": 0.15}
 ARMS = (("laplace", "joint"), ("gaussian", "joint"), ("laplace", "standard"), ("laplace", "no-kl"))

@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from cluster.progress import ProgressLine
 from studies.cells import table
 from workers.dataset.folder import Dataset, open_dataset
-from workers.dataset.location import location
 from workers.dataset.statistics import bad_steps
+from workers.dataset.storage.location import location
 
 HELD_OUT = 0.1
 EPOCHS, BATCH, WIDTH = 48, 128, 128

@@ -17,18 +17,19 @@ from jaxtyping import Float, Float32
 from matplotlib.figure import Figure
 from torch import Tensor
 
-from cluster.figures import STYLES
-from cluster.training_job import episodes
+from cluster.comparison.figure import STYLES
+from cluster.training.worker import episodes
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source
-from svaedc import checkpoint, methods
-from svaedc.candidates import Problem, as_they_are
-from svaedc.comparison import trials
-from svaedc.episodes import Batch, Episodes, measured_over
-from svaedc.features import LatentMeans, Latents
-from svaedc.intervals import Estimate, bootstrap
-from svaedc.model import SvaeDc
-from svaedc.offline import INITIAL, Recorded
+from svaedc.analysis.statistics import Estimate, bootstrap
+from svaedc.bo import methods
+from svaedc.bo.candidates import Problem, as_they_are
+from svaedc.bo.features import LatentMeans, Latents
+from svaedc.bo.loop import trials
+from svaedc.bo.offline import INITIAL, Recorded
+from svaedc.data.episodes import Batch, Episodes, measured_over
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
 from workers import setups
 from workers.dataset.cache import TrainingCache
 from workers.dataset.shards import sha256

@@ -15,15 +15,15 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from cluster.comparison_job import ComparisonJob
-from cluster.results import RunKey, recorded, rows
+from cluster.comparison.records import RunKey, recorded, rows
+from cluster.comparison.worker import ComparisonJob
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
-from svaedc import checkpoint
-from svaedc.episodes import Episodes
-from svaedc.seeds import FIRST_TUNING
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.seeds import FIRST_TUNING
+from svaedc.analysis.summary import Reporting
+from svaedc.data.episodes import Episodes
+from svaedc.model import checkpoint
 from workers import setups
 
 INITIAL, TRIALS = 2, 20

@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import torch
 
-from cluster.training_job import episodes
-from svaedc.diagnostics import collapse, evaluate
-from svaedc.episodes import Episodes
-from svaedc.model import SvaeDc, initialised
-from svaedc.offline import Recorded, worth
-from svaedc.presets import Preset, Sizes, preset
-from svaedc.settings import TrainingSettings
-from svaedc.training import fit
-from svaedc.variants import varied
+from cluster.training.worker import episodes
+from svaedc.bo.offline import Recorded, worth
+from svaedc.data.episodes import Episodes
+from svaedc.model.diagnostics import collapse, evaluate
+from svaedc.model.svae_dc import SvaeDc, initialised
+from svaedc.training.config import TrainingSettings
+from svaedc.training.loop import fit
+from svaedc.training.presets import Preset, Sizes, preset, varied
 from workers import setups
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import Dataset, open_dataset

@@ -45,7 +45,7 @@ os.environ["AWS_DEFAULT_REGION"] = "us-east-1"
 def ray_session():
     """One local Ray cluster of four logical CPUs for all tests that need one."""
     from cluster.config import RaySettings
-    from cluster.session import connect
+    from cluster.runtime.session import connect
 
     with connect(RaySettings(num_cpus=4, object_store_memory=150_000_000), address=None) as session:
         yield session
@@ -111,8 +111,8 @@ def small_dataset(ray_session, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 def _collected(episodes: int, per_shard: int, session, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from cluster.collect import collect
     from cluster.config import CollectSettings, TrackingSettings
+    from cluster.datasets.collect import collect
     from cluster.tracking import open_tracker
     from workers import setups
 

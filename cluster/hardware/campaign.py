@@ -9,9 +9,9 @@ from jaxtyping import Float
 
 from cluster.hardware.events import Trial
 from cluster.hardware.journal import Journal
-from cluster.hardware.standing import RANDOM_TRIALS, Standing, standing
 from cluster.hardware.states import TERMINAL, State
-from svaedc.history import History
+from cluster.hardware.status import RANDOM_TRIALS, Standing, standing
+from svaedc.bo.history import History
 from workers.hardware.driver import RobotDriver, RobotFault
 from workers.randomness import generator
 

@@ -14,12 +14,11 @@ from cluster.config import HardwareSettings
 from cluster.errors import UserError
 from cluster.hardware import journal, operator
 from cluster.hardware.actor import actor_options
-from cluster.hardware.entrance import LEAVE_SECONDS, POLL_SECONDS, Say, at_the_robot, require_robot_host
+from cluster.hardware.connect import LEAVE_SECONDS, POLL_SECONDS, Say, at_the_robot, require_robot_host
 from cluster.hardware.plan import Plan
-from cluster.hardware.standing import Standing
 from cluster.hardware.states import State
-from cluster.hardware.status import Status
-from cluster.session import Session
+from cluster.hardware.status import Standing, Status
+from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 
 BROKEN = frozenset({State.FAILED, State.REJECTED})

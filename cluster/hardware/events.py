@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -149,3 +150,8 @@ def broken_link(events: Iterable[Event], genesis: str) -> str | None:
             return f"event {event.seq} (trial {event.trial}, {event.new}) was altered"
         prev = event.hash
     return None
+
+
+def utc_now() -> datetime:
+    """Now, in UTC."""
+    return datetime.now(UTC)

@@ -8,7 +8,7 @@ from uuid import uuid4
 from cluster.errors import UserError
 from cluster.hardware import campaign, journal
 from cluster.hardware.campaign import Campaign
-from cluster.hardware.clock import utc_now
+from cluster.hardware.events import utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.plan import Plan

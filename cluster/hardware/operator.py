@@ -7,8 +7,7 @@ from pathlib import Path
 
 from cluster.errors import UsageError
 from cluster.hardware import campaign, journal, lock
-from cluster.hardware.clock import utc_now
-from cluster.hardware.events import Trial, canonical
+from cluster.hardware.events import Trial, canonical, utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.states import State

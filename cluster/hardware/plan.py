@@ -6,7 +6,7 @@ from pathlib import Path
 from cluster.errors import UsageError
 from cluster.hardware.identity import Approval, Identity
 from cluster.hardware.proposals import fingerprint
-from svaedc import methods
+from svaedc.bo import methods
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
 
@@ -42,7 +42,7 @@ def identify(
 
     Args:
         robot: in the registry.
-        method: of `svaedc.methods`.
+        method: of `svaedc.bo.methods`.
         trials: suggested trials after the random ones, at least 0.
         seed: of every random draw, at least 0.
         pool: number of random controllers the method chooses from, at least 1.

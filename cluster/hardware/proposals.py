@@ -12,12 +12,13 @@ from jaxtyping import Float
 from cluster.errors import UserError
 from cluster.hardware.campaign import Suggest
 from cluster.hardware.identity import Identity
-from svaedc import checkpoint, methods
-from svaedc.adjustment import Adjustable
-from svaedc.candidates import Problem
-from svaedc.densities import Densities
-from svaedc.features import Latents
-from svaedc.model import SvaeDc
+from svaedc.bo import methods
+from svaedc.bo.candidates import Problem
+from svaedc.bo.distribution_features import Densities
+from svaedc.bo.features import Latents
+from svaedc.bo.online import Adjustable
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
 from workers.randomness import generator
 from workers.setups import Setup
 

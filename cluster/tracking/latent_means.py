@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from svaedc import checkpoint
+from svaedc.model import checkpoint
 
 
 class LatentMeans:

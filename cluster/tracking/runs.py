@@ -20,7 +20,7 @@ from mlflow.protos.databricks_pb2 import RESOURCE_DOES_NOT_EXIST, ErrorCode
 from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.errors import UserError
-from workers.dataset.location import Location
+from workers.dataset.storage.location import Location
 
 UI_PORT = 5000
 """Where `svaedc ui` serves a SQLite store unless told otherwise; a run's link points there."""

@@ -15,13 +15,13 @@ import numpy as np
 
 from tests.chaos import victims
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset import shards
 from workers.dataset.folder import MANIFEST, Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import sweep_digests
 from workers.dataset.shards import Shard, present
-from workers.dataset.writers import WRITING, writer
+from workers.dataset.storage.temporary import WRITING, writer
 
 REPOSITORY = Path(__file__).parents[2]
 SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 2400

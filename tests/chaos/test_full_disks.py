@@ -14,7 +14,7 @@ from tests.chaos.drivers import (
     seed,
 )
 from workers.dataset.folder import MANIFEST
-from workers.dataset.writers import WRITING
+from workers.dataset.storage.temporary import WRITING
 
 pytestmark = pytest.mark.chaos
 

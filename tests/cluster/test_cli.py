@@ -41,9 +41,7 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
         "hardware",
     ):
         assert command in result.stdout
-    loaded = (
-        "import cluster.cli, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"
-    )
+    loaded = "import cluster.cli.main, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"
     listed = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert listed.stdout.strip() == "[]"
 

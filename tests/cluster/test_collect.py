@@ -17,24 +17,24 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cluster.collect import collect
-from cluster.collection_work import note_failure, rollout_pool
+from cluster.cli.dataset import info
 from cluster.config import CollectSettings
-from cluster.dataset_commands import info
+from cluster.datasets.collect import collect
+from cluster.datasets.gather import note_failure, rollout_pool
+from cluster.datasets.progress import Recorder, Tally
+from cluster.datasets.quarantine import put_aside, quarantined, release
+from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
-from cluster.pool import Failed
-from cluster.quarantine import put_aside, quarantined, release
-from cluster.rollout_actor import RolloutActor
-from cluster.tally import Recorder, Tally
+from cluster.runtime.actor_pool import Failed
 from cluster.tracking import open_tracker
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import inventory
 from workers.dataset.shards import Shard, digest_path
+from workers.dataset.storage.temporary import WRITING, host, writer
 from workers.dataset.verification import verify
-from workers.dataset.writers import WRITING, host, writer
 
 SETTINGS = CollectSettings(actors=2, episodes_per_shard=8)
 

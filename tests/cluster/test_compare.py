@@ -19,26 +19,24 @@ import pytest
 import torch
 from matplotlib.markers import MarkerStyle
 
-from cluster import figures
-from cluster.compare import compare
-from cluster.comparison_folder import alone_in, claim
-from cluster.comparison_job import evaluation
-from cluster.comparison_plan import planned, usable
-from cluster.comparison_runs import Standing
-from cluster.comparison_tracking import begin
+from cluster.comparison import figure
+from cluster.comparison.compare import compare
+from cluster.comparison.folder import alone_in, claim
+from cluster.comparison.plan import Grid, planned, usable
+from cluster.comparison.records import RunKey, all_runs, append, recorded, seeds_in
+from cluster.comparison.tracking import begin
+from cluster.comparison.tune import Standing
+from cluster.comparison.worker import evaluation
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
-from cluster.grid import Grid
-from cluster.results import RunKey, all_runs, append, recorded, seeds_in
 from cluster.tracking import open_tracker
-from svaedc import checkpoint
-from svaedc.comparison import Trial
-from svaedc.methods import names
-from svaedc.model import SvaeDc
-from svaedc.presets import Sizes, compact
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
-from svaedc.variants import varied
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.summary import Reporting, Row
+from svaedc.bo.loop import Trial
+from svaedc.bo.methods import names
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import Sizes, compact, varied
 from workers import setups
 
 SETTINGS = CompareSettings(slots=2, pool_size=200)
@@ -544,7 +542,7 @@ def test_the_figure_has_the_same_bytes_every_time_and_names_every_method(tmp_pat
     ]
     summary = summarise([*rows, Row("unfinished", 0, 0, 0.0, success=False)], Reporting(), rng)
     drawn = [
-        figures.best_so_far(tmp_path / name, summary, title="some title", initial=2, limits=(-1.0, 1.0))
+        figure.best_so_far(tmp_path / name, summary, title="some title", initial=2, limits=(-1.0, 1.0))
         for name in ("one.png", "other.png")
     ]
     for one, other in zip(*drawn, strict=True):
@@ -555,6 +553,6 @@ def test_the_figure_has_the_same_bytes_every_time_and_names_every_method(tmp_pat
 
 
 def test_every_method_has_a_marker_of_its_own_that_shows_without_an_edge():
-    markers = [figures.STYLES[name][1] for name in figures.STYLES]
+    markers = [figure.STYLES[name][1] for name in figure.STYLES]
     assert all(MarkerStyle(marker).is_filled() for marker in markers)
     assert len(set(markers)) == len(markers)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import pyarrow.parquet as pq
 import pytest
 
-from cluster.comparison_job import ComparisonJob
-from cluster.comparison_report import lines, publish, summary_of
-from cluster.results import RunKey, all_runs
+from cluster.comparison.records import RunKey, all_runs
+from cluster.comparison.report import lines, publish, summary_of
+from cluster.comparison.worker import ComparisonJob
 from workers import setups
 from workers.tasks.quadratic import Quadratic
 

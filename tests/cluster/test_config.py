@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from cluster.config import Settings
 from cluster.errors import UsageError
-from cluster.settings_file import load_settings
+from cluster.settings import load_settings
 
 REPOSITORY = Path(__file__).parents[2]
 RAY_CONFIG = REPOSITORY / "ray_config.yaml"

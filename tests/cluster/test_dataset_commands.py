@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cluster.cli import app
+from cluster.cli.main import app
 from cluster.errors import UsageError, UserError
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
-from workers.dataset.writers import writer
+from workers.dataset.storage.temporary import writer
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_an_export_of_a_damaged_dataset_leaves_nothing(dataset, tmp_path):
 
 
 def test_an_export_removes_what_a_killed_one_left_and_nothing_else(dataset, tmp_path):
-    script = "import sys; from workers.dataset.writers import writer; print(writer())"
+    script = "import sys; from workers.dataset.storage.temporary import writer; print(writer())"
     dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     others = ["npz.backup", f"lerobot.{dead.stdout.strip()}", f"npz.{writer()}-2"]
     for name in (f"npz.{dead.stdout.strip()}", *others):

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from cluster.compare import Comparison
+from cluster.comparison.compare import Comparison
 from cluster.config import CollectSettings, CompareSettings, Settings, TrainSettings
 from cluster.demo import DemoSize, conclusion, demo, verdict
 from cluster.errors import UserError
-from cluster.session import Session
+from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.summary import Reporting, Row
 from workers.randomness import generator
 
 ALONE = Session("127.0.0.1:1", is_local=True, cpus=1)

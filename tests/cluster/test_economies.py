@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from cluster import economies
+from cluster.runtime import ray_internals
 
 SPECTATORS = ("log_monitor.py", "dashboard.py")
 
@@ -50,12 +50,12 @@ tell("environment", *(name for name in ("REPORTER_UPDATE_INTERVAL_MS",) if name 
 
 def test_what_the_user_has_chosen_is_left_alone(monkeypatch):
     monkeypatch.setenv("RAY_enable_metrics_collection", "1")
-    assert "enable_metrics_collection" not in economies.settings()
+    assert "enable_metrics_collection" not in ray_internals.settings()
 
 
 def test_metrics_are_off_unless_the_user_has_chosen(monkeypatch):
     monkeypatch.delenv("RAY_enable_metrics_collection", raising=False)
-    assert economies.settings()["enable_metrics_collection"] is False
+    assert ray_internals.settings()["enable_metrics_collection"] is False
 
 
 @pytest.mark.parametrize("before", [None, "1234"])
@@ -64,8 +64,8 @@ def test_a_later_cluster_does_not_inherit_the_agents_settings(monkeypatch, befor
     monkeypatch.setenv(name, before or "")
     if before is None:
         monkeypatch.delenv(name)
-    with economies.quiet_agent():
-        assert os.environ[name] == (before or economies.AGENT[name])
+    with ray_internals.quiet_agent():
+        assert os.environ[name] == (before or ray_internals.AGENT[name])
     assert os.environ.get(name) == before
 
 

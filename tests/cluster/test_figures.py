@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cluster.figures import _moving_channels
-from svaedc.episodes import Episodes
+from cluster.training.figures import _moving_channels
+from svaedc.data.episodes import Episodes
 from workers import setups
 from workers.dataset.identity import identity_of
 

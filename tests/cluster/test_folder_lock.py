@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from cluster.errors import UserError
-from cluster.folder_lock import alone_in
+from cluster.files import alone_in
 
 HOLDER = """
 import os, sys, time

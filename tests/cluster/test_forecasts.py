@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from cluster.collect import collect, foretell
 from cluster.config import CollectSettings
+from cluster.datasets.collect import collect, foretell
+from cluster.datasets.pilot import PLAN, begin, review, spent
+from cluster.datasets.progress import Tally
 from cluster.errors import UserError
-from cluster.forecasts import PLAN, begin, review, spent
-from cluster.tally import Tally
 from cluster.tracking import open_tracker
 from workers import setups
+from workers.collection.forecast import Estimate, Forecast
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.writers import WRITING
-from workers.forecast import Estimate, Forecast
+from workers.dataset.storage.temporary import WRITING
 
 SETTINGS = CollectSettings(actors=2, episodes_per_shard=2)
 

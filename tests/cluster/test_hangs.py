@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
-from workers.dataset.writers import WRITING
+from workers.dataset.storage.temporary import WRITING
 
 STICKY = '''
 """quadratic-30d, but some episodes hang: once, or for as long as a file says so."""

@@ -12,10 +12,10 @@ import pytest
 from tests.chaos.victims import kill, raylets
 from tests.cluster.conftest import MACHINE
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.writers import WRITING
+from workers.dataset.storage.temporary import WRITING
 
 REPOSITORY = Path(__file__).parents[2]
 SLOW = '''

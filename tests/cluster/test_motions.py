@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 
 SIDE = (64, 48)
 
@@ -25,8 +25,8 @@ def episode(small_dataset):
 
 def shown(episode, stride: int):
     """A telling whose model repeats the episode exactly."""
-    from cluster.motions import Telling
-    from svaedc.renditions import Rendition
+    from cluster.rendering.model_frames import Telling
+    from svaedc.model.reconstruction import Rendition
     from workers.rollout import sampled
 
     xi = episode.xi[:, sampled(500, stride)]
@@ -40,9 +40,9 @@ def parts(strip):
 
 @pytest.mark.parametrize("stride", [1, 5])
 def test_a_model_that_repeats_the_trajectory_is_drawn_like_it(setup, episode, stride):
-    from cluster.motions import strips
-    from cluster.render import Moment
-    from workers.pictures import Size
+    from cluster.rendering.frames import Moment
+    from cluster.rendering.model_frames import strips
+    from workers.rendering import Size
 
     moments = [Moment(step, ()) for step in (4, 249, 499)]
     drawn = [parts(strip) for strip in strips(setup, shown(episode, stride), moments, Size(*SIDE))]
@@ -54,15 +54,15 @@ def test_a_model_that_repeats_the_trajectory_is_drawn_like_it(setup, episode, st
 
 
 def test_every_picture_says_how_bad_it_is_where_the_model_knows():
-    from cluster.motions import badness_note
+    from cluster.rendering.model_frames import badness_note
 
     assert badness_note(0.254) == "bad 25%"
     assert badness_note(float("nan")) == ""
 
 
 def test_blocks_stand_in_rows_of_two_below_their_titles():
-    from cluster.captions import TITLE
-    from cluster.motions import GAP, board
+    from cluster.rendering.frames import TITLE
+    from cluster.rendering.model_frames import GAP, board
 
     strip = np.full((10, 30, 3), 70, dtype=np.uint8)
     whole = board(["a", "b", "c"], [[strip, strip]] * 3)
@@ -73,9 +73,9 @@ def test_blocks_stand_in_rows_of_two_below_their_titles():
 
 
 def test_an_episode_of_other_sizes_than_the_models_is_refused(episode):
-    from cluster.motions import telling
-    from svaedc.architecture import ModelConfig
-    from svaedc.model import SvaeDc
+    from cluster.rendering.model_frames import telling
+    from svaedc.model.config import ModelConfig
+    from svaedc.model.svae_dc import SvaeDc
 
     model = SvaeDc(ModelConfig(48, 25, 50)).eval()
     with pytest.raises(ValueError, match=r"\(48, 25, 50\), this episode has \(48, 25, 100\)"):
@@ -84,9 +84,9 @@ def test_an_episode_of_other_sizes_than_the_models_is_refused(episode):
 
 
 def test_a_setup_with_nothing_to_see_leaves_no_file_and_says_so(tmp_path, capsys):
-    from cluster.motions import remarkable_motions
-    from svaedc.architecture import ModelConfig
-    from svaedc.model import SvaeDc
+    from cluster.rendering.model_frames import remarkable_motions
+    from svaedc.model.config import ModelConfig
+    from svaedc.model.svae_dc import SvaeDc
     from workers import setups
     from workers.dataset.cache import training_cache
     from workers.dataset.folder import create
@@ -104,7 +104,7 @@ def test_a_setup_with_nothing_to_see_leaves_no_file_and_says_so(tmp_path, capsys
 
 
 def test_a_clip_and_its_stills_come_from_the_same_moments(setup, episode, tmp_path):
-    from cluster.motions import motions
+    from cluster.rendering.model_frames import motions
 
     made = motions(tmp_path, [shown(episode, 5)], setup, 2)
     assert [path.name for path in made] == ["motions.png", "motions.gif"]

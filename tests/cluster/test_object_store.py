@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cluster.cli import app
-from cluster.collection_work import planned
+from cluster.cli.main import app
+from cluster.datasets.gather import planned
+from cluster.datasets.pilot import spent
+from cluster.datasets.progress import Tally
+from cluster.datasets.quarantine import put_aside, quarantined, release
+from cluster.datasets.worker import RolloutActor
 from cluster.errors import UsageError, UserError
-from cluster.forecasts import spent
-from cluster.options import dataset_location, durable_dataset
-from cluster.quarantine import put_aside, quarantined, release
-from cluster.rollout_actor import RolloutActor
-from cluster.tally import Tally
-from svaedc import checkpoint
+from cluster.inputs import dataset_location, durable_dataset
+from svaedc.model import checkpoint
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import Dataset, create, open_dataset
 from workers.dataset.identity import identity_of
-from workers.dataset.location import Location
-from workers.dataset.writers import WRITING
+from workers.dataset.storage.location import Location
+from workers.dataset.storage.temporary import WRITING
 
 SETUP = "quadratic-30d"
 

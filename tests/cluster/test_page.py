@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from cluster.page import page
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
+from cluster.comparison.html import page
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.summary import Reporting, Row
 
 
 def rows(methods: dict[str, float], first_seed: int) -> list[Row]:

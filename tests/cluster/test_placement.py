@@ -4,8 +4,8 @@ import pytest
 
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
-from cluster.placement import Machine, Placement, place
-from cluster.training_submission import placed
+from cluster.runtime.placement import Machine, Placement, place
+from cluster.training.launch import placed
 
 
 @pytest.mark.parametrize(

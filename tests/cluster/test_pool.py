@@ -12,8 +12,8 @@ import pytest
 import ray
 
 from cluster.errors import UserError
-from cluster.machines import is_there, own_machine
-from cluster.pool import Done, Failed, Limits, Pool
+from cluster.runtime.actor_pool import Done, Failed, Limits, Pool
+from cluster.runtime.machines import is_there, own_machine
 
 pytestmark = pytest.mark.usefixtures("ray_session")
 

@@ -5,9 +5,8 @@ import time
 
 import pytest
 
-from cluster.rates import Rates
-from cluster.tally import Tally
-from workers.collection import ShardReport
+from cluster.datasets.progress import Rates, Tally
+from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
 
 

@@ -2,15 +2,14 @@
 
 import pytest
 
-from cluster.costs import comparing, training
-from cluster.recipe import Panel, Recipe
-from cluster.recipes import RECIPES, recipe
-from cluster.scales import SCALES, scale
-from svaedc import methods
-from svaedc.claims import Claim
-from svaedc.evidence import MedianGap
-from svaedc.paired_evidence import Gain
-from svaedc.variants import LATENT_SIZES
+from cluster.reproduction.cost import comparing, training
+from cluster.reproduction.experiment import Panel, Recipe
+from cluster.reproduction.figures import RECIPES, recipe
+from cluster.reproduction.plan import SCALES, scale
+from svaedc.analysis.evidence import Claim, MedianGap
+from svaedc.analysis.paired_evidence import Gain
+from svaedc.bo import methods
+from svaedc.training.presets import LATENT_SIZES
 from workers import setups
 from workers.hardware import robots
 

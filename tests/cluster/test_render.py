@@ -22,7 +22,7 @@ def setup():
 @pytest.fixture(scope="module")
 def episode(setup):
     """Six made-up steps are bad in one way, the last step in two."""
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
 
     made = exhibit("random:7", setup, None)
     bad = np.zeros(60, dtype=np.uint8)
@@ -40,7 +40,7 @@ def stripes():
 
 
 def test_a_clip_reaches_the_last_step_and_loses_no_bad_one(setup, episode):
-    from cluster.render import clip
+    from cluster.rendering.frames import clip
 
     moments = clip(setup, episode, 0.05, 10)  # 60 steps of 2 ms in 24 pictures
     assert len(moments) == 24
@@ -51,7 +51,7 @@ def test_a_clip_reaches_the_last_step_and_loses_no_bad_one(setup, episode):
 
 
 def test_stills_show_the_first_and_last_step_and_what_holds_just_then(setup, episode):
-    from cluster.render import stills
+    from cluster.rendering.frames import stills
 
     moments = stills(setup, episode, 6)
     assert [moment.step for moment in moments] == [0, 12, 24, 35, 47, 59]
@@ -60,7 +60,7 @@ def test_stills_show_the_first_and_last_step_and_what_holds_just_then(setup, epi
 
 
 def test_a_graded_condition_is_shown_with_its_degree(setup):
-    from cluster.render import held
+    from cluster.rendering.frames import held
 
     assert held(setup, np.array([0.0, 0.25, 0.1], dtype=np.float32)) == ("object_tipped 25%",)
     assert held(setup, np.zeros(3, dtype=np.float32)) == ()
@@ -68,7 +68,7 @@ def test_a_graded_condition_is_shown_with_its_degree(setup):
 
 @pytest.mark.parametrize(("seconds", "speed"), [(1.0, 0.2), (6.0, 1.0), (24.0, 3.0)])
 def test_a_clip_whose_speed_nobody_chose_lasts_5_to_8_seconds(setup, seconds, speed):
-    from cluster.render import usual_speed
+    from cluster.rendering.frames import usual_speed
 
     assert usual_speed(replace(setup, horizon=round(seconds / 0.002))) == pytest.approx(speed)
 
@@ -76,14 +76,14 @@ def test_a_clip_whose_speed_nobody_chose_lasts_5_to_8_seconds(setup, seconds, sp
 @pytest.mark.parametrize("speed", [0.0, 0.01, -1.0, float("nan"), float("inf")])
 def test_a_speed_that_cannot_be_shown_is_refused(setup, episode, speed):
     from cluster.errors import UsageError
-    from cluster.render import clip
+    from cluster.rendering.frames import clip
 
     with pytest.raises(UsageError, match=r"--speed must be at least 0\.02 with --fps 10"):
         clip(setup, episode, speed, 10)
 
 
 def test_only_a_bad_step_has_a_red_border_and_the_picture_itself_stays():
-    from cluster.captions import RED, captioned
+    from cluster.rendering.frames import RED, captioned
 
     blank = np.full((90, 120, 3), 90, dtype=np.uint8)
     good = captioned(blank, "0.10 s", "franka", ())
@@ -98,7 +98,7 @@ def test_only_a_bad_step_has_a_red_border_and_the_picture_itself_stays():
 
 
 def test_a_gif_opens_again_with_every_picture_in_its_place(stripes, tmp_path):
-    from cluster.film import write
+    from cluster.rendering.video import write
 
     write(tmp_path / "clip.gif", ".gif", iter(stripes), 10)
     with Image.open(tmp_path / "clip.gif") as clip:
@@ -113,7 +113,7 @@ def test_a_gif_opens_again_with_every_picture_in_its_place(stripes, tmp_path):
 
 
 def test_a_png_holds_the_stills_in_rows_without_loss(stripes, tmp_path):
-    from cluster.film import write
+    from cluster.rendering.video import write
 
     write(tmp_path / "strip.png", ".png", iter(stripes), 10)
     with Image.open(tmp_path / "strip.png") as image:
@@ -126,7 +126,7 @@ def test_a_png_holds_the_stills_in_rows_without_loss(stripes, tmp_path):
 
 def test_an_mp4_opens_again_with_every_picture_and_its_rate(stripes, tmp_path):
     av = pytest.importorskip("av")
-    from cluster.film import HOLD, write
+    from cluster.rendering.video import HOLD, write
 
     write(tmp_path / "clip.mp4", ".mp4", iter(stripes), 10)
     with av.open(str(tmp_path / "clip.mp4")) as container:
@@ -139,7 +139,7 @@ def test_an_mp4_opens_again_with_every_picture_and_its_rate(stripes, tmp_path):
 
 
 def test_a_controller_given_in_three_ways_is_the_same(setup, tmp_path):
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
     from workers.randomness import generator
 
     x = generator(7, "controller", 0).random(48, dtype=np.float32)
@@ -151,7 +151,7 @@ def test_a_controller_given_in_three_ways_is_the_same(setup, tmp_path):
 
 
 def test_a_seed_draws_the_physics_of_data_collection(setup):
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
     from workers.rollout import random_episode
 
     with setup.open() as environment:
@@ -163,7 +163,7 @@ def test_a_seed_draws_the_physics_of_data_collection(setup):
 
 
 def test_an_episode_of_a_dataset_comes_as_it_was_recorded(small_dataset):
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
     from workers import setups
     from workers.rollout import random_episode
 
@@ -192,7 +192,7 @@ def test_an_episode_of_a_dataset_comes_as_it_was_recorded(small_dataset):
 )
 def test_a_controller_that_does_not_exist_is_refused_with_a_remedy(setup, wanted, message):
     from cluster.errors import UserError
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
 
     with pytest.raises(UserError, match=message):
         exhibit(wanted, setup, None)
@@ -200,7 +200,7 @@ def test_a_controller_that_does_not_exist_is_refused_with_a_remedy(setup, wanted
 
 def test_an_episode_that_a_dataset_does_not_hold_is_refused(small_dataset):
     from cluster.errors import UsageError
-    from cluster.exhibit import exhibit
+    from cluster.rendering.episodes import exhibit
     from workers import setups
 
     with pytest.raises(UsageError, match="holds no episode 16; its files hold 0 to 7, 8 to 15"):
@@ -232,8 +232,8 @@ def test_the_command_writes_what_it_says(tmp_path):
     ],
 )
 def test_a_wish_that_cannot_be_met_is_refused_before_anything_is_written(tmp_path, name, width, message):
+    from cluster.cli.render import render
     from cluster.errors import UsageError
-    from cluster.render_command import render
 
     if name.endswith("mp4"):
         pytest.importorskip("av")

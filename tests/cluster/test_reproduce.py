@@ -9,30 +9,27 @@ import numpy as np
 import pytest
 import torch
 
-from cluster.bill import bill, lines
+from cluster.comparison.records import RunKey, append
 from cluster.config import CompareSettings, Settings, TrainSettings
 from cluster.errors import UserError
-from cluster.recipe import Panel, Recipe
-from cluster.recipes import RECIPES
-from cluster.reproduce import reproduce
-from cluster.reproduction import resolved
-from cluster.reproduction_report import publish, table
-from cluster.results import RunKey, append
-from cluster.scales import SCALES
-from cluster.session import Session
+from cluster.reproduction.cost import bill, lines
+from cluster.reproduction.experiment import Panel, Recipe
+from cluster.reproduction.figures import RECIPES
+from cluster.reproduction.plan import SCALES, resolved
+from cluster.reproduction.report import publish, table
+from cluster.reproduction.run import reproduce
+from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from svaedc import checkpoint
-from svaedc.claims import Claim
-from svaedc.comparison import Trial
-from svaedc.evidence import Successes
-from svaedc.model import SvaeDc
-from svaedc.paired_evidence import Gain
-from svaedc.presets import Sizes, compact
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
-from svaedc.variants import varied
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.evidence import Claim, Successes
+from svaedc.analysis.paired_evidence import Gain
+from svaedc.analysis.summary import Reporting, Row
+from svaedc.bo.loop import Trial
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import Sizes, compact, varied
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import create
 from workers.dataset.identity import identity_of
 

@@ -9,7 +9,7 @@ import pytest
 
 from cluster.config import RaySettings
 from cluster.errors import UsageError, UserError
-from cluster.session import Session, connect
+from cluster.runtime.session import Session, connect
 
 JOIN = """
 import sys

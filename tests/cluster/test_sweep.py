@@ -5,18 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from cluster.collect import collect
 from cluster.config import CollectSettings, TrainSettings
+from cluster.datasets.collect import collect
 from cluster.errors import UsageError, UserError
-from cluster.session import Session
-from cluster.sweep import CHANGES, require_one_cpu, sweep
-from cluster.sweep_job import RESULT, Point
+from cluster.files import write_json
+from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from cluster.train import working_in
-from cluster.training_job import TrainingJob
-from cluster.training_record import write_json
-from svaedc.presets import Sizes, preset
-from svaedc.variants import varied
+from cluster.training.sweep import CHANGES, require_one_cpu, sweep
+from cluster.training.sweep_worker import RESULT, Point
+from cluster.training.train import working_in
+from cluster.training.worker import TrainingJob
+from svaedc.training.presets import Sizes, preset, varied
 from workers import setups
 
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from cluster.termination import terminating_as_exit
+from cluster.runtime.signals import terminating_as_exit
 
 
 @contextmanager

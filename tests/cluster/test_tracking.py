@@ -14,7 +14,7 @@ import pytest
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
 from cluster.tracking import open_tracker
-from cluster.ui import serve_ui
+from cluster.tracking.server import serve_ui
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -209,7 +209,7 @@ def served(settings, tracker, free_port):
     with tracker.run("franka push of the browser test", "compare", {}):
         pass
     program = (
-        "import sys; from cluster.config import TrackingSettings; from cluster.ui import serve_ui;"
+        "import sys; from cluster.config import TrackingSettings; from cluster.tracking.server import serve_ui;"
         f"serve_ui(TrackingSettings(uri={settings.uri!r}, experiment='tests'), {free_port},"
         " lambda page: print(page, flush=True))"
     )

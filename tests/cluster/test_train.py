@@ -14,9 +14,9 @@ import torch
 from cluster.config import TrackingSettings, TrainSettings
 from cluster.errors import UsageError, UserError
 from cluster.tracking import open_tracker
-from cluster.train import train, working_in
-from cluster.training_record import judge
-from svaedc import checkpoint
+from cluster.training.record import judge
+from cluster.training.train import train, working_in
+from svaedc.model import checkpoint
 
 
 def settings(cache: Path, **changes) -> TrainSettings:

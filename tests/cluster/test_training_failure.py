@@ -17,8 +17,8 @@ from ray.train.v2._internal.exceptions import (
     WorkerHealthCheckTimeoutError,
 )
 
-from cluster.training_failure import explanation, is_death
-from cluster.training_submission import interrupts_kept
+from cluster.training.failures import explanation, is_death
+from cluster.training.launch import interrupts_kept
 
 KILLED = WorkerHealthCheckFailedError("A worker health check failed.\nWorker info: ...", ActorDiedError())
 # As torch 2.13 words it in one process when the other is killed.

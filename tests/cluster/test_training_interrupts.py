@@ -11,7 +11,7 @@ import psutil
 import pytest
 import torch
 
-from svaedc import checkpoint
+from svaedc.model import checkpoint
 
 
 def weights(path: Path) -> dict[str, torch.Tensor]:

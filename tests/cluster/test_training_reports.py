@@ -10,10 +10,10 @@ import pytest
 import ray
 
 from cluster.errors import UserError
-from cluster.mailbox import mailbox
 from cluster.progress import ProgressLine
+from cluster.runtime.mailbox import mailbox
 from cluster.tracking import Run, Tracker, open_tracker
-from cluster.training_reports import Reports
+from cluster.training.reports import Reports
 
 
 @contextmanager

@@ -11,14 +11,14 @@ from ray.train import RunConfig, ScalingConfig
 from ray.train.torch import TorchTrainer
 
 from cluster.errors import UserError
-from cluster.mailbox import mailbox
-from cluster.placement import Placement
 from cluster.progress import ProgressLine
-from cluster.termination import terminating_as_exit
+from cluster.runtime.mailbox import mailbox
+from cluster.runtime.placement import Placement
+from cluster.runtime.signals import terminating_as_exit
 from cluster.tracking import open_tracker
-from cluster.training_job import TrainingJob, trained
-from cluster.training_submission import interrupts_kept, submit
-from svaedc import checkpoint
+from cluster.training.launch import interrupts_kept, submit
+from cluster.training.worker import TrainingJob, trained
+from svaedc.model import checkpoint
 from workers.dataset.folder import open_dataset
 
 

@@ -18,7 +18,7 @@ from workers.randomness import generator
 from workers.rollout import rollout
 
 PAGE = Path(__file__).parents[2] / "docs" / "hardware.md"
-REHEARSALS = sorted(robots.ROBOTS.keys() & setups.MODULES.keys())
+REHEARSALS = sorted(robots.ROBOTS.keys() & setups.SETUPS.keys())
 """Robots that are setups too are simulated; a test that connected another would move it."""
 
 SEED = 3

@@ -7,8 +7,8 @@ import pytest
 import torch
 from gpytorch.kernels import Kernel
 
-from svaedc import divergences, kernels
-from svaedc.features import Sigmoid, Whitened, svae, svae_dc
+from svaedc.bo import distribution_features, kernels
+from svaedc.bo.features import Sigmoid, Whitened, svae, svae_dc
 
 K = 3
 
@@ -58,8 +58,8 @@ CASES = {
     "svae": compressed(kernels.se, svae),
     "svae-matern": compressed(kernels.matern, svae),
     **COMPRESSED,
-    "bbk-kl": Case(lambda: kernels.kl(divergences.gaussian, median=2.0), distributions),
-    "lkl": Case(lambda: kernels.kl(divergences.laplace, median=2.0), distributions),
+    "bbk-kl": Case(lambda: kernels.kl(distribution_features.gaussian, median=2.0), distributions),
+    "lkl": Case(lambda: kernels.kl(distribution_features.laplace, median=2.0), distributions),
 }
 every_kernel = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc import methods
-from svaedc.history import History
+from svaedc.bo import methods
+from svaedc.bo.history import History
 from tests.svaedc.fake_latents import problem, quadratic
 
 DIMENSIONS, CANDIDATES = 4, 60

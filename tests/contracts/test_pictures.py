@@ -9,7 +9,7 @@ import pybullet
 import pytest
 
 from workers import setups
-from workers.pictures import Show, Size, frames, pose_of, scenery_of
+from workers.rendering import Show, Size, frames, pose_of, scenery_of
 from workers.rollout import random_episode
 from workers.simulation.stage import Stage
 
@@ -18,7 +18,7 @@ STEPS = 120  # long enough for an arm to reach its objects and for a walker to l
 
 def _visible() -> list[str]:
     """All but the setups that are formulas: a robot that lacks scenery must fail here."""
-    return sorted(name for name in setups.MODULES if not name.startswith("quadratic"))
+    return sorted(name for name in setups.SETUPS if not name.startswith("quadratic"))
 
 
 @pytest.fixture(scope="module", params=_visible())

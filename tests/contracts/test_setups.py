@@ -26,7 +26,7 @@ EXAMPLE = str(Path(__file__).parents[2] / "examples" / "two_link_pusher")
 SHORT = 300  # control steps; whole episodes run in the slow tests
 
 
-@pytest.fixture(scope="module", params=[*sorted(setups.MODULES), "two_link_pusher"])
+@pytest.fixture(scope="module", params=[*sorted(setups.SETUPS), "two_link_pusher"])
 def whole(request):
     """A setup that ships, or the example of a user's own, found as a user's would be."""
     with pytest.MonkeyPatch.context() as patch:

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 from cluster.config import CollectSettings, CompareSettings, Settings, TrainSettings
 from cluster.demo import DemoSize, demo
 from cluster.tracking import open_tracker
-from svaedc import checkpoint
+from svaedc.model import checkpoint
 from workers.dataset.folder import open_dataset
 from workers.dataset.verification import verify
 

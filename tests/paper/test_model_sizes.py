@@ -3,10 +3,10 @@
 import pytest
 import torch
 
-from svaedc.architecture import ModelConfig, ScaleBounds
-from svaedc.distributions import DiagonalLaplace
-from svaedc.model import SvaeDc
-from svaedc.presets import Sizes, paper
+from svaedc.model.config import ModelConfig, ScaleBounds
+from svaedc.model.distributions import DiagonalLaplace
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import Sizes, paper
 
 FRANKA = Sizes(controller_dim=48, observation_dim=25, time_steps=500)
 

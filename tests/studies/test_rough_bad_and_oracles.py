@@ -6,7 +6,7 @@ import torch
 
 from studies.oracle import gain, looked_up
 from studies.sensitivity import ROUGH, SAME, Cell, cells_of, flipped, late
-from svaedc.episodes import Episodes
+from svaedc.data.episodes import Episodes
 
 RNG = np.random.default_rng(7)
 

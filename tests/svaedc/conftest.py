@@ -13,7 +13,7 @@ def bounds() -> tuple[list[float], list[float]]:
 
 @pytest.fixture(scope="session")
 def episodes():
-    from svaedc.episodes import Episodes
+    from svaedc.data.episodes import Episodes
 
     rng = np.random.default_rng(0)
     x = rng.random((600, CONTROLLER), dtype=np.float32)
@@ -27,14 +27,14 @@ def episodes():
 
 @pytest.fixture(scope="session")
 def halves(episodes):
-    from svaedc.episodes import split
+    from svaedc.data.episodes import split
 
     return split(episodes, np.arange(9, 600, 10))
 
 
 @pytest.fixture(scope="session")
 def small_config():
-    from svaedc.architecture import ModelConfig
+    from svaedc.model.config import ModelConfig
 
     return ModelConfig(
         CONTROLLER,
@@ -50,7 +50,7 @@ def small_config():
 
 @pytest.fixture
 def model(small_config, halves, bounds):
-    from svaedc.model import initialised
+    from svaedc.model.svae_dc import initialised
 
     return initialised(small_config, halves[0], bounds, seed=0)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import torch
 
-from svaedc import divergences
-from svaedc.adjustment import Adjustable
-from svaedc.candidates import Problem
-from svaedc.densities import Densities, Density
-from svaedc.features import Latents
+from svaedc.bo import distribution_features
+from svaedc.bo.candidates import Problem
+from svaedc.bo.distribution_features import Densities, Density
+from svaedc.bo.features import Latents
+from svaedc.bo.online import Adjustable
 
 TAU_DIMENSIONS = 3
 
@@ -43,7 +43,9 @@ def problem(dimensions: int, candidates: int, seed: int) -> Problem:
     """A run's problem with a random pool and its fake latents, objectives between -1 and 1."""
     pool = np.random.default_rng(seed).random((candidates, dimensions), dtype=np.float32)
     latents = Latents.of(torch.tensor(pool), latent_means)
-    densities = Densities(tau=Density(rows, divergences.laplace), xi=Density(rows, divergences.gaussian))
+    densities = Densities(
+        tau=Density(rows, distribution_features.laplace), xi=Density(rows, distribution_features.gaussian)
+    )
     adjustable = Adjustable(FakeModel(), layers=("last.weight",))
     return Problem(dimensions, (-1.0, 1.0), pool, latents, densities, adjustable)
 

@@ -5,8 +5,8 @@ import pytest
 import torch
 from botorch.acquisition.analytic import LogExpectedImprovement, UpperConfidenceBound
 
-from svaedc import kernels, surrogates
-from svaedc.acquisitions import log_ei, ucb
+from svaedc.bo import gp, kernels
+from svaedc.bo.acquisition import log_ei, ucb
 
 
 def tensor(*values):
@@ -15,7 +15,7 @@ def tensor(*values):
 
 def fitted():
     phi = torch.rand(8, 2, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
-    return surrogates.fit(lambda: kernels.se(2), phi, phi.sum(dim=1) / 2)
+    return gp.fit(lambda: kernels.se(2), phi, phi.sum(dim=1) / 2)
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,10 @@ import pytest
 import torch
 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-from svaedc import kernels, methods, surrogates
-from svaedc.adjustment import LAST_LAYERS, Adjustable, AdjustedPaths
-from svaedc.features import Sigmoid
-from svaedc.history import History
+from svaedc.bo import gp, kernels, methods
+from svaedc.bo.features import Sigmoid
+from svaedc.bo.history import History
+from svaedc.bo.online import LAST_LAYERS, Adjustable, AdjustedPaths
 from tests.svaedc.fake_latents import FakeModel, latent_means, problem
 
 FAKE = Adjustable(FakeModel(), layers=("last.weight",))
@@ -45,7 +45,7 @@ def test_fit_adjusts_alpha_c_and_the_last_layer_and_raises_the_posterior_density
     f = (0.5 + latent_means(x(20))[0] @ torch.tensor([0.0, 0.0, 0.4], dtype=torch.float64)).clamp(0, 1)
 
     def density(make):
-        process = surrogates.fit(make, x(20), f).model
+        process = gp.fit(make, x(20), f).model
         process.train()
         return ExactMarginalLogLikelihood(process.likelihood, process)(process(x(20)), f).item()
 
@@ -54,7 +54,7 @@ def test_fit_adjusts_alpha_c_and_the_last_layer_and_raises_the_posterior_density
         made.phi.requires_grad_(requires_grad=False)
         return made
 
-    fitted = surrogates.fit(kernel, x(20), f).model.covar_module.phi
+    fitted = gp.fit(kernel, x(20), f).model.covar_module.phi
     assert all(offset.abs().max() > 1e-4 for offset in fitted.parameters())
     assert density(kernel) > density(held)
 
@@ -63,7 +63,7 @@ def test_fit_leaves_the_trained_model_as_it_was(model, episodes):
     model = model.eval()
     before = {name: value.clone() for name, value in model.state_dict().items()}
     at, f = torch.tensor(episodes.x[:6]).double(), torch.linspace(0, 1, 6).double()
-    surrogates.fit(lambda: kernel(Adjustable(model), model.config.tau_size), at, f)
+    gp.fit(lambda: kernel(Adjustable(model), model.config.tau_size), at, f)
     for name, value in model.state_dict().items():
         assert torch.equal(value, before[name])
         assert value.dtype == before[name].dtype
@@ -71,7 +71,7 @@ def test_fit_leaves_the_trained_model_as_it_was(model, episodes):
 
 def test_few_trials_move_no_weight_by_more_than_one_standard_deviation_of_its_prior():
     f = torch.full((8,), 0.5, dtype=torch.float64)
-    fitted = surrogates.fit(kernel, x(8), f).model.covar_module.phi
+    fitted = gp.fit(kernel, x(8), f).model.covar_module.phi
     assert max(offset.abs().max().item() for offset in fitted.parameters()) < 1
 
 

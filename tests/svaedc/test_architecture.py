@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from svaedc.architecture import KERNEL, STRIDE, ModelConfig, ScaleBounds, decoded_length, encoded_length
+from svaedc.model.config import KERNEL, STRIDE, ModelConfig, ScaleBounds, decoded_length, encoded_length
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from botorch.fit import fit_gpytorch_mll
 from botorch.models import SingleTaskGP
 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-from svaedc import baselines
+from svaedc.bo import gp
 
 
 def trials(count=8):
@@ -19,13 +19,13 @@ def test_default_process_is_botorchs_own_in_the_units_of_the_objective():
     pool = torch.rand(9, 3, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     with torch.no_grad():
         theirs = model.posterior(pool[:, None])
-    mu, sigma = baselines.default(x, f).moments(pool)
+    mu, sigma = gp.default(x, f).moments(pool)
     torch.testing.assert_close(mu, theirs.mean.flatten(), rtol=1e-4, atol=1e-4)
     torch.testing.assert_close(sigma, theirs.variance.sqrt().flatten(), rtol=1e-4, atol=1e-4)
 
 
 def test_process_of_turbo_keeps_to_its_ranges():
-    model = baselines.turbo(*trials()).model
+    model = gp.turbo(*trials()).model
     lengthscale = model.covar_module.base_kernel.lengthscale
     assert lengthscale.shape == (1, 3)
     assert ((lengthscale > 0.005) & (lengthscale < 4 + 1e-6)).all()
@@ -35,10 +35,10 @@ def test_process_of_turbo_keeps_to_its_ranges():
 @pytest.mark.parametrize(
     ("surrogate", "count"),
     [
-        *((baselines.default, count) for count in (1, 2, 8)),
-        *((baselines.turbo, count) for count in (2, 8)),
-        pytest.param(baselines.saas, 2, marks=pytest.mark.slow),
-        pytest.param(baselines.saas, 8, marks=pytest.mark.slow),
+        *((gp.default, count) for count in (1, 2, 8)),
+        *((gp.turbo, count) for count in (2, 8)),
+        pytest.param(gp.saas, 2, marks=pytest.mark.slow),
+        pytest.param(gp.saas, 8, marks=pytest.mark.slow),
     ],
 )
 def test_baseline_believes_its_measurements_and_doubts_what_is_far(surrogate, count):

@@ -7,7 +7,7 @@ import pickle
 import pytest
 import torch
 
-from svaedc import checkpoint
+from svaedc.model import checkpoint
 
 METADATA = {"setup": "franka", "stride": 5, "dataset": "ab12", "versions": {"torch": "2"}}
 

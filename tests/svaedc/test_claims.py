@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from svaedc.claims import Claim
-from svaedc.evidence import Evidence, MedianGap, Steadier, Successes
-from svaedc.paired_evidence import Gain, Like, NoBetter
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.evidence import Claim, Evidence, MedianGap, Steadier, Successes
+from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
+from svaedc.analysis.summary import Reporting, Row
 
 INITIAL = 2
 

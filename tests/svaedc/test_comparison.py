@@ -4,8 +4,8 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from svaedc import methods
-from svaedc.comparison import Outcome, trials
+from svaedc.bo import methods
+from svaedc.bo.loop import Outcome, trials
 from tests.svaedc.fake_latents import problem, quadratic
 
 INITIAL = np.array([[0.5, 0.5], [0.9, 0.1]], dtype=np.float32)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.diagnostics import collapse, evaluate
-from svaedc.model import initialised
+from svaedc.model.diagnostics import collapse, evaluate
+from svaedc.model.svae_dc import initialised
 
 GOOD = {"active_share": 1.0, "rec_norm": 0.5, "gen_norm": 0.6, "corr_y_rec": 0.99, "mae_y_rec": 0.01}
 ABOUT_Y = ("corr_y_rec", "mae_y_rec")

@@ -7,7 +7,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc.distributions import (
+from svaedc.model.distributions import (
     FAMILIES,
     DiagonalGaussian,
     DiagonalLaplace,

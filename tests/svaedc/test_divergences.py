@@ -3,11 +3,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc import divergences
+from svaedc.bo import distribution_features
 
 FAMILIES = [
-    (divergences.gaussian, torch.distributions.Normal),
-    (divergences.laplace, torch.distributions.Laplace),
+    (distribution_features.gaussian, torch.distributions.Normal),
+    (distribution_features.laplace, torch.distributions.Laplace),
 ]
 
 
@@ -26,7 +26,7 @@ def test_divergence_is_that_of_torch_pair_by_pair(divergence, family):
             torch.testing.assert_close(divergence(p, q)[i, j], exact)
 
 
-@pytest.mark.parametrize("divergence", [divergences.gaussian, divergences.laplace])
+@pytest.mark.parametrize("divergence", [distribution_features.gaussian, distribution_features.laplace])
 @given(seed=st.integers(0, 10_000))
 def test_divergence_is_never_negative_and_zero_from_itself(divergence, seed):
     p = rows(6, seed)
@@ -40,5 +40,8 @@ def test_products_lose_no_digits_to_a_common_offset():
     shifted = p.clone()
     shifted[:, :4] += 1e6
     torch.testing.assert_close(
-        divergences.gaussian(shifted, shifted), divergences.gaussian(p, p), rtol=1e-6, atol=1e-6
+        distribution_features.gaussian(shifted, shifted),
+        distribution_features.gaussian(p, p),
+        rtol=1e-6,
+        atol=1e-6,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.episodes import Episodes, split
+from svaedc.data.episodes import Episodes, split
 
 CPU = torch.device("cpu")
 

@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from svaedc.features import Latents, Sigmoid, Whitened, svae, svae_dc
+from svaedc.bo.features import Latents, Sigmoid, Whitened, svae, svae_dc
 from tests.svaedc.fake_latents import latent_means
 
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
 
-from svaedc.history import History
+from svaedc.bo.history import History
 
 
 def history(count=3, dimensions=2):

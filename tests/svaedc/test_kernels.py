@@ -3,8 +3,8 @@ import math
 import pytest
 import torch
 
-from svaedc import divergences, kernels
-from svaedc.features import svae_dc
+from svaedc.bo import distribution_features, kernels
+from svaedc.bo.features import svae_dc
 from tests.svaedc.fake_latents import latent_means
 
 KERNELS = [kernels.se, kernels.matern]
@@ -65,7 +65,10 @@ def test_svae_dc_on_latents_equals_the_outer_kernel_on_cached_features(kernel):
 
 @pytest.mark.parametrize(
     ("divergence", "family"),
-    [(divergences.gaussian, torch.distributions.Normal), (divergences.laplace, torch.distributions.Laplace)],
+    [
+        (distribution_features.gaussian, torch.distributions.Normal),
+        (distribution_features.laplace, torch.distributions.Laplace),
+    ],
 )
 def test_kl_kernel_is_the_formula_pair_by_pair(divergence, family):
     x1, x2 = (
@@ -88,13 +91,15 @@ def test_kl_kernel_is_the_formula_pair_by_pair(divergence, family):
 
 
 def test_alpha_starts_at_the_inverse_of_the_median_distance():
-    assert kernels.kl(divergences.gaussian, median=4.0).base_kernel.alpha.item() == pytest.approx(0.25)
+    assert kernels.kl(distribution_features.gaussian, median=4.0).base_kernel.alpha.item() == pytest.approx(
+        0.25
+    )
 
 
 def test_kl_kernel_of_gaussians_of_one_scale_is_an_exponential_of_their_distance():
     mu = points(8, 3)
     rows = torch.cat([mu, torch.full_like(mu, math.log(0.2))], dim=1)
-    matrix = kernels.kl(divergences.gaussian, median=1.0).double()(rows, rows + 0).to_dense()
+    matrix = kernels.kl(distribution_features.gaussian, median=1.0).double()(rows, rows + 0).to_dense()
     expected = 0.5 * torch.exp(-math.sqrt(2) * torch.cdist(mu, mu) / 0.2)
     torch.testing.assert_close(matrix, expected, atol=1e-6, rtol=1e-6)
 

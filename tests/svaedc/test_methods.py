@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc import methods
-from svaedc.candidates import Problem, as_they_are, by_latents
-from svaedc.features import Latents, svae_dc
-from svaedc.history import History
+from svaedc.bo import methods
+from svaedc.bo.candidates import Problem, as_they_are, by_latents
+from svaedc.bo.features import Latents, svae_dc
+from svaedc.bo.history import History
 from tests.svaedc.fake_latents import latent_means, problem, quadratic
 
 

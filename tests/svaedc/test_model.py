@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.architecture import ModelConfig, ScaleBounds
-from svaedc.model import SvaeDc, initialised
+from svaedc.model.config import ModelConfig, ScaleBounds
+from svaedc.model.svae_dc import SvaeDc, initialised
 
 VARIANTS = [
     pytest.param(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.normaliser import SPREAD_FLOOR, Normaliser, measure
+from svaedc.model.normalizer import SPREAD_FLOOR, Normaliser, measure
 
 RNG = np.random.default_rng(1)
 

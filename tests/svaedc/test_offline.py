@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.offline import Recorded, worth
+from svaedc.bo.offline import Recorded, worth
 
 RNG = np.random.default_rng(0)
 X = RNG.random((120, 3), dtype=np.float32)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from svaedc.presets import PRESETS, Sizes, preset, usual_stride
+from svaedc.training.presets import PRESETS, Sizes, preset, usual_stride
 
 SIZES = Sizes(controller_dim=48, observation_dim=25, time_steps=100)
 

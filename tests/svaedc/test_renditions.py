@@ -8,7 +8,7 @@ import torch
 
 
 def test_renditions_are_the_models_reconstruction_and_generation(model, episodes):
-    from svaedc.renditions import renditions
+    from svaedc.model.reconstruction import renditions
 
     model.eval()
     row = 3
@@ -25,8 +25,8 @@ def test_renditions_are_the_models_reconstruction_and_generation(model, episodes
 
 
 def test_a_model_without_psi_tells_no_badness(small_config, halves, bounds, episodes):
-    from svaedc.model import initialised
-    from svaedc.renditions import renditions
+    from svaedc.model.reconstruction import renditions
+    from svaedc.model.svae_dc import initialised
 
     model = initialised(replace(small_config, psi_dim=0), halves[0], bounds, seed=0).eval()
     told = renditions(model, episodes.x[0], episodes.xi[0], episodes.bad[0], 0.5)
@@ -34,7 +34,7 @@ def test_a_model_without_psi_tells_no_badness(small_config, halves, bounds, epis
 
 
 def test_the_best_the_worst_and_two_others_are_chosen():
-    from svaedc.renditions import remarkable
+    from svaedc.model.reconstruction import remarkable
 
     f = np.array([0.1, -2.0, 0.4, 0.9, 0.3], dtype=np.float32)
     chosen = remarkable(f, np.random.default_rng(0))
@@ -46,7 +46,7 @@ def test_the_best_the_worst_and_two_others_are_chosen():
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_few_episodes_are_chosen_as_far_as_they_go(count):
-    from svaedc.renditions import remarkable
+    from svaedc.model.reconstruction import remarkable
 
     chosen = remarkable(np.arange(count, dtype=np.float32), np.random.default_rng(0))
     assert set(chosen.values()) == set(range(count))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc.sampling import ALONE, STRATA, Balanced, Shard, batches
+from svaedc.data.samplers import ALONE, STRATA, Balanced, Shard, batches
 
 SEED = (0, 0)
 

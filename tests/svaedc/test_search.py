@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.candidates import as_they_are, by_latents
-from svaedc.features import svae_dc
-from svaedc.history import History
-from svaedc.search import ByGradient, OverPool, torch_randomness
+from svaedc.bo.acquisition import ByGradient, OverPool, torch_randomness
+from svaedc.bo.candidates import as_they_are, by_latents
+from svaedc.bo.features import svae_dc
+from svaedc.bo.history import History
 from tests.svaedc.fake_latents import problem
 
 NOTHING = History.empty(2)

@@ -1,6 +1,6 @@
 import pytest
 
-from svaedc.seeds import common_purpose, purpose
+from svaedc.analysis.seeds import common_purpose, purpose
 
 
 def test_tuning_begins_at_one_thousand():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from svaedc.settings import WEIGHTINGS, StageSettings, TrainingSettings, Weighting
+from svaedc.training.config import WEIGHTINGS, StageSettings, TrainingSettings, Weighting
 
 STAGE = StageSettings(
     updates=40_000,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from svaedc.significance import FLIPS, holm, sign_flip
+from svaedc.analysis.statistics import FLIPS, holm, sign_flip
 
 
 def differences(runs, shift=0.0, seed=0):

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy import stats
 
-from svaedc.intervals import Estimate, bootstrap, proportion, share, student_t
-from svaedc.significance import holm, sign_flip
-from svaedc.statistics import summarise
-from svaedc.summaries import Reporting, Row
+from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.statistics import Estimate, bootstrap, holm, proportion, share, sign_flip, student_t
+from svaedc.analysis.summary import Reporting, Row
 
 OBJECTIVE = st.one_of(st.floats(-2, 2, width=32), st.just(math.nan))
 

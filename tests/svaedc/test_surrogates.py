@@ -6,7 +6,7 @@ import torch
 from gpytorch.kernels import RBFKernel
 from linear_operator.utils.errors import NotPSDError
 
-from svaedc import kernels, surrogates
+from svaedc.bo import gp, kernels
 
 
 def trials(count, dimensions=3, seed=0):
@@ -26,7 +26,7 @@ def hyper_parameters(model):
 def test_prediction_is_the_closed_form_of_a_gaussian_process():
     phi, f = trials(9)
     candidates, _ = trials(7, seed=1)
-    process = surrogates.fit(isotropic, phi, f)
+    process = gp.fit(isotropic, phi, f)
     model = process.model
     ell, sigma2 = model.covar_module.base_kernel.lengthscale.item(), model.covar_module.outputscale.item()
     noise, mean = model.likelihood.noise.item(), model.mean_module.constant.item()
@@ -45,7 +45,7 @@ def test_prediction_is_the_closed_form_of_a_gaussian_process():
 def test_moments_are_those_of_botorch_whatever_the_batch():
     phi, f = trials(12)
     pool, _ = trials(24, seed=1)
-    process = surrogates.fit(lambda: kernels.matern(3), phi, f)
+    process = gp.fit(lambda: kernels.matern(3), phi, f)
     with torch.no_grad():
         theirs = process.model.posterior(pool[:, None])
     for shape in ((24,), (24, 1), (2, 3, 4)):
@@ -55,7 +55,7 @@ def test_moments_are_those_of_botorch_whatever_the_batch():
 
 
 def test_gradients_reach_the_features_and_leave_the_hyper_parameters_alone():
-    process = surrogates.fit(isotropic, *trials(6))
+    process = gp.fit(isotropic, *trials(6))
     phi = trials(2, seed=1)[0].requires_grad_()
     assert torch.autograd.gradcheck(process.moments, phi)
     assert not any(parameter.requires_grad for parameter in process.model.parameters())
@@ -64,7 +64,7 @@ def test_gradients_reach_the_features_and_leave_the_hyper_parameters_alone():
 @pytest.mark.parametrize("kernel", [isotropic, lambda: kernels.se(3), lambda: kernels.matern(3)])
 @pytest.mark.parametrize("count", [1, 2, 22])
 def test_fitted_hyper_parameters_stay_within_their_ranges(kernel, count):
-    surrogate = surrogates.fit(kernel, *trials(count))
+    surrogate = gp.fit(kernel, *trials(count))
     covariance = surrogate.model.covar_module
 
     def within(values, low, high):
@@ -74,7 +74,7 @@ def test_fitted_hyper_parameters_stay_within_their_ranges(kernel, count):
     assert surrogate.event == ""
     assert within(covariance.base_kernel.lengthscale, *kernels.LENGTHSCALE)
     assert within(covariance.outputscale, *kernels.OUTPUT_SCALE)
-    assert within(surrogate.model.likelihood.noise, surrogates.LEAST_NOISE, math.inf)
+    assert within(surrogate.model.likelihood.noise, gp.LEAST_NOISE, math.inf)
     assert within(surrogate.model.mean_module.constant, 0, 1)
 
 
@@ -92,22 +92,21 @@ def test_fit_raises_the_marginal_likelihood_of_the_starting_point():
         return kernel
 
     assert (
-        log_likelihood(surrogates.fit(isotropic, phi, f).model)
-        > log_likelihood(surrogates.fit(unfitted, phi, f).model) + 0.1
+        log_likelihood(gp.fit(isotropic, phi, f).model) > log_likelihood(gp.fit(unfitted, phi, f).model) + 0.1
     )
 
 
 def test_dimension_without_influence_gets_the_longer_lengthscale():
     generator = torch.Generator().manual_seed(3)
     phi = torch.rand(25, 2, generator=generator, dtype=torch.float64)
-    model = surrogates.fit(lambda: kernels.se(2), phi, 0.5 + 0.4 * torch.sin(8 * phi[:, 0])).model
+    model = gp.fit(lambda: kernels.se(2), phi, 0.5 + 0.4 * torch.sin(8 * phi[:, 0])).model
     relevant, irrelevant = model.covar_module.base_kernel.lengthscale.flatten().tolist()
     assert irrelevant > 3 * relevant
 
 
 def test_repeated_controllers_with_different_outcomes_do_not_break_the_fit():
     phi, f = torch.full((20, 3), 0.5).double(), torch.linspace(0, 1, 20).double()
-    surrogate = surrogates.fit(isotropic, phi, f)
+    surrogate = gp.fit(isotropic, phi, f)
     assert surrogate.event == ""
     assert torch.isfinite(torch.stack(surrogate.moments(phi))).all()
 
@@ -127,8 +126,8 @@ class FailsInFitsOfMoreThan(RBFKernel):
 
 def test_failed_fit_keeps_the_last_good_hyper_parameters_and_says_so(caplog):
     phi, f = trials(8)
-    surrogate = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi, f)
-    last_good = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi[:5], f[:5])
+    surrogate = gp.fit(lambda: FailsInFitsOfMoreThan(5), phi, f)
+    last_good = gp.fit(lambda: FailsInFitsOfMoreThan(5), phi[:5], f[:5])
     assert last_good.event == ""
     for name, value in hyper_parameters(last_good.model).items():
         torch.testing.assert_close(hyper_parameters(surrogate.model)[name], value)
@@ -138,14 +137,14 @@ def test_failed_fit_keeps_the_last_good_hyper_parameters_and_says_so(caplog):
 
 def test_surrogate_with_borrowed_hyper_parameters_still_knows_every_trial():
     phi, f = trials(8)
-    model = surrogates.fit(lambda: FailsInFitsOfMoreThan(5), phi, f).model
+    model = gp.fit(lambda: FailsInFitsOfMoreThan(5), phi, f).model
     torch.testing.assert_close(model.train_inputs[0], phi)
     torch.testing.assert_close(model.train_targets, f)
 
 
 def test_fit_that_never_succeeds_predicts_with_the_starting_hyper_parameters():
     phi, f = trials(3)
-    surrogate = surrogates.fit(lambda: FailsInFitsOfMoreThan(0), phi, f)
+    surrogate = gp.fit(lambda: FailsInFitsOfMoreThan(0), phi, f)
     assert surrogate.event
     assert surrogate.model.covar_module.lengthscale.item() == pytest.approx(math.log(2))
     assert torch.isfinite(torch.stack(surrogate.moments(phi))).all()
@@ -153,4 +152,4 @@ def test_fit_that_never_succeeds_predicts_with_the_starting_hyper_parameters():
 
 def test_scaling_puts_the_limits_at_zero_and_one():
     f = torch.tensor([-2.0, 0.0, 2.0, 4.0], dtype=torch.float64)
-    assert surrogates.scaled(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]
+    assert gp.scaled(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]

@@ -7,12 +7,12 @@ import pytest
 import torch
 from torch import nn
 
-from svaedc.diagnostics import collapse, evaluate
-from svaedc.model import initialised
-from svaedc.sampling import Balanced, Shard
-from svaedc.settings import StageSettings, TrainingSettings, Weighting
-from svaedc.training import EpochReport, fit
-from svaedc.workplace import Workplace
+from svaedc.data.samplers import Balanced, Shard
+from svaedc.model.diagnostics import collapse, evaluate
+from svaedc.model.svae_dc import initialised
+from svaedc.training.config import StageSettings, TrainingSettings, Weighting
+from svaedc.training.distributed import Workplace
+from svaedc.training.loop import EpochReport, fit
 
 JOINT = StageSettings(
     updates=25,

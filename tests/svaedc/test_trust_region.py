@@ -6,7 +6,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc.trust_region import FIRST_LENGTH, LARGEST_LENGTH, SMALLEST_LENGTH, SUCCESSES, TrustRegion
+from svaedc.bo.trust_region import FIRST_LENGTH, LARGEST_LENGTH, SMALLEST_LENGTH, SUCCESSES, TrustRegion
 
 RISING = list(itertools.accumulate([1.0] * 30))
 

@@ -3,9 +3,8 @@
 import pytest
 import torch
 
-from svaedc.model import SvaeDc
-from svaedc.presets import PRESETS, Sizes, preset
-from svaedc.variants import LATENT_SIZES, VARIATIONS, varied
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import LATENT_SIZES, PRESETS, VARIATIONS, Sizes, preset, varied
 
 SIZES = Sizes(controller_dim=6, observation_dim=5, time_steps=60)
 CHANGES = {

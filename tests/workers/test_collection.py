@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset import shards
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.verification import verify
-from workers.environments.franka import MODEL
 from workers.environments.tabletop import Tabletop
 from workers.rollout import random_episode
+from workers.setups.franka import MODEL
 
 COLLECT = """
 import os, resource, signal, sys

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from workers import setups
 from workers.controllers.controller import unit_cube
 from workers.controllers.end_effector import _force, _moment, _torque
-from workers.environments import franka
+from workers.setups import franka
 
 LIMITS = franka.TORQUE_LIMITS
 REST = (0.0, 0.0, 0.0)

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from workers.collection import ShardReport
+from workers.collection.forecast import Estimate, Forecast, forecast
+from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
-from workers.forecast import Estimate, Forecast, forecast
 
 
 def reports(costs, episodes=16):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from workers import setups
-from workers.environments import franka, franka_rehearsal
 from workers.environments.tabletop import Tabletop
+from workers.setups import franka
 
 
 def _fastest(model) -> np.ndarray:
@@ -24,16 +24,16 @@ def _fastest(model) -> np.ndarray:
     return np.max(speeds, axis=0)
 
 
-@pytest.mark.parametrize("limit", [0.5, franka_rehearsal.SPEED_LIMIT])
+@pytest.mark.parametrize("limit", [0.5, franka.SPEED_LIMIT])
 def test_no_joint_is_faster_than_the_limit_and_the_fastest_reaches_it(limit):
     fastest = _fastest(replace(franka.MODEL, arm=replace(franka.ARM, speed_limit=limit)))
     assert fastest.max() == pytest.approx(limit, abs=1e-6)
 
 
 def test_the_setup_has_none_and_its_stand_in_has_one():
-    assert _fastest(franka.MODEL).max() > franka_rehearsal.SPEED_LIMIT
+    assert _fastest(franka.MODEL).max() > franka.SPEED_LIMIT
     with setups.load("franka-rehearsal").open() as scene:
-        assert scene._model.arm.speed_limit == franka_rehearsal.SPEED_LIMIT
+        assert scene._model.arm.speed_limit == franka.SPEED_LIMIT
 
 
 def test_it_differs_from_the_setup_only_in_name_and_simulation():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from workers import setups
-from workers.environments.franka import MODEL
 from workers.environments.tabletop import Tabletop
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import generator
 from workers.rollout import rollout
+from workers.setups.franka import MODEL
 
 CRASH = 40  # control step
 

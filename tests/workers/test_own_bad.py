@@ -11,20 +11,21 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cluster.rollout_actor import RolloutActor
+from cluster.datasets.worker import RolloutActor
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.cache import training_cache
 from workers.dataset.folder import create
 from workers.dataset.identity import Identity, identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.statistics import statistics
 from workers.dataset.verification import verify
-from workers.environments.franka import MODEL
 from workers.environments.tabletop import Tabletop
 from workers.gymnasium_environment import SetupEnvironment
 from workers.rollout import random_episode
-from workers.tasks.own_bad import conditions, with_bad
+from workers.setups.franka import MODEL
+from workers.setups.user_bad import with_bad
+from workers.tasks.own_bad import conditions
 
 SHIFT = 7
 SOURCE = f"""

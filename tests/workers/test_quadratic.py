@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.cache import training_cache
 from workers.dataset.folder import create
 from workers.dataset.identity import identity_of

@@ -7,19 +7,19 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cluster.dataset_repair import repair_dataset
+from cluster.datasets.repair import repair_dataset
 from cluster.errors import UserError
 from workers import setups
-from workers.collection import collect_shard, require_same_code, roll_out
+from workers.collection.recompute import broken, drawn, rederive, repair
+from workers.collection.shard import collect_shard, require_same_code, roll_out
 from workers.dataset import schema, shards
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.inventory import inventory, sweep_digests
 from workers.dataset.replacement import REPLACED, Repair
 from workers.dataset.shards import Shard, digest_path, sha256
+from workers.dataset.storage.temporary import WRITING, writer
 from workers.dataset.verification import verify
-from workers.dataset.writers import WRITING, writer
-from workers.rederivation import broken, drawn, rederive, repair
 
 FRANKA = setups.load("franka")
 MIDDLE = Shard(2, 4)

@@ -9,9 +9,9 @@ import pytest
 
 from workers import rollout, setups
 from workers.environments.environment import Channel
-from workers.environments.franka import MODEL
 from workers.environments.tabletop import Tabletop
 from workers.rollout import random_episode
+from workers.setups.franka import MODEL
 
 CRASH = 200  # control step
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from workers import setups
-from workers.environments import franka
 from workers.environments.tabletop import first_two_axes
+from workers.setups import franka
 from workers.simulation.arm import Arm
 from workers.simulation.world import World
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from workers import setups
-from workers.collection import require_working
+from workers.collection.shard import require_working
 from workers.rollout import Episode, random_episode
 from workers.tasks.task import Task
 

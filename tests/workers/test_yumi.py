@@ -10,8 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from workers import setups
-from workers.environments import yumi, yumi_description
+from workers.environments import yumi_description
 from workers.environments.yumi_description import ARM, ARM_MASS, CAPSULES, GRIPPER_MASS, Capsule
+from workers.setups import yumi
 
 DESCRIPTION = Path(yumi.ARM.urdf)
 

@@ -13,10 +13,10 @@ from jaxtyping import Bool, Float32, Int64
 from workers.dataset.cache_files import Layout, finish, is_finished, make, opened
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
-from workers.dataset.writers import is_dead, writer
+from workers.dataset.storage.location import Location
+from workers.dataset.storage.temporary import is_dead, writer
 from workers.rollout import DIVERGED, degrees, sampled
 
 _CHANGED = "{} was changed while it was decoded; let whatever repairs or replaces it end, and run this again"

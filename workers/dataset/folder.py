@@ -10,10 +10,10 @@ from jaxtyping import Int64
 
 from workers.dataset import shards
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location, fetched
 from workers.dataset.manifest import MANIFEST, begun, manifest_text
 from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
+from workers.dataset.storage.location import Location, fetched
 from workers.rollout import DIVERGED, Episode
 
 

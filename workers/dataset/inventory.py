@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 from workers.dataset.folder import Dataset
-from workers.dataset.location import Location, files
 from workers.dataset.manifest import MANIFEST, manifest_text
 from workers.dataset.schema import read_identity
 from workers.dataset.shards import Shard, missing, named, readable_sha256, recorded_digest
+from workers.dataset.storage.location import Location, files
+from workers.dataset.storage.temporary import WRITING
 from workers.dataset.verification import Problem
-from workers.dataset.writers import WRITING
 
 _DIGEST = ".sha256"
 

@@ -4,10 +4,10 @@ import hashlib
 import json
 
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location
-from workers.dataset.object_path import ObjectPath
-from workers.dataset.publication import link, synchronise, temporary_file
-from workers.dataset.writers import WRITING, is_dead, writer
+from workers.dataset.storage.atomic import link, synchronise, temporary_file
+from workers.dataset.storage.location import Location
+from workers.dataset.storage.s3_path import ObjectPath
+from workers.dataset.storage.temporary import WRITING, is_dead, writer
 
 MANIFEST = "dataset.json"
 

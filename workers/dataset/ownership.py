@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location
+from workers.dataset.storage.location import Location
 
 IDENTITY_TEXT = "svaedc.identity"
 IDENTITY_DIGEST = "svaedc.digest"

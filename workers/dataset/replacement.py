@@ -4,9 +4,9 @@ from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 
-from workers.dataset.location import Location
-from workers.dataset.publication import link, move, synchronise, temporary_file
 from workers.dataset.shards import Shard, digest_line, digest_path, readable_sha256, sha256
+from workers.dataset.storage.atomic import link, move, synchronise, temporary_file
+from workers.dataset.storage.location import Location
 
 REPLACED = ".replaced"
 """Folder, below the dataset, of what stood in a shard's place; readers of Parquet folders skip its name."""

@@ -14,10 +14,10 @@ import pyarrow.parquet as pq
 from jaxtyping import Float32, Float64, Int64, UInt8
 
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location, source
-from workers.dataset.object_store import refusal
 from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_in, require_own
 from workers.dataset.quantisation import described, restored, stored
+from workers.dataset.storage.location import Location, source
+from workers.dataset.storage.s3 import refusal
 from workers.rollout import Episode
 
 ROW_GROUP = 64  # episodes

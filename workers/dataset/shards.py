@@ -7,10 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from workers.dataset.location import Location, fetched
-from workers.dataset.object_store import StoreError
-from workers.dataset.publication import link, move, synchronise, temporary_file
-from workers.dataset.writers import WRITING, is_dead
+from workers.dataset.storage.atomic import link, move, synchronise, temporary_file
+from workers.dataset.storage.location import Location, fetched
+from workers.dataset.storage.s3 import StoreError
+from workers.dataset.storage.temporary import WRITING, is_dead
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")
 _BLOCK = 1 << 20

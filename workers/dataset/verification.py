@@ -9,9 +9,9 @@ import numpy as np
 from workers.dataset import shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
-from workers.dataset.location import Location, fetched
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
+from workers.dataset.storage.location import Location, fetched
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
 from workers.rollout import DIVERGED, degrees

@@ -87,7 +87,7 @@ CAPSULES = (  # of the links 1 to 7, shoulder to wrist
 ARM_MASS = 9.5  # kg; shared among the links by volume
 GRIPPER_MASS = 0.22  # kg
 DAMPING = 0.5  # N·m·s/rad
-EFFORT = 30.0  # N·m, of the motors of `workers.environments.yumi`
+EFFORT = 30.0  # N·m, of the motors of `workers.setups.yumi`
 
 _FLANGE = '<cylinder radius="0.032" length="0.023"/>'
 _PALM = ('<box size="0.080 0.066 0.092"/>', (0.0, 0.0, 0.053))

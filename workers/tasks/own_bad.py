@@ -7,17 +7,14 @@ Example, in a module `gentle.py`, for `svaedc collect --setup franka --bad gentl
     ...     return np.clip(np.hypot(x, y) - 0.5, 0.0, 1.0)  # one degree of badness per step
 """
 
-import difflib
-import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float32
 
 from workers.environments.environment import Observed
-from workers.setups import Setup, file_digest, imported
 from workers.tasks.task import Bad, Task
 
 Function = Callable[[Observed], Any]
@@ -37,6 +34,12 @@ def conditions(*names: str) -> Callable[[_Marked], _Marked]:
         return function
 
     return mark
+
+
+def marked_conditions(function: Function) -> tuple[str, ...]:
+    """Names that `conditions` gave to the rows of a function; () for one that returns one degree per step."""
+    names: tuple[str, ...] = getattr(function, _NAMES, ())
+    return names
 
 
 @dataclass(frozen=True)
@@ -107,43 +110,6 @@ class OwnBad(Task):
                 "condition, or unmark it to return one degree in [0, 1] per step"
             )
         return values
-
-
-def with_bad(setup: Setup, name: str) -> Setup:
-    """The setup with G_bad from `module:function`; with its own for the name "".
-
-    Raises:
-        LookupError: there is no such module, or no such function in it.
-    """
-    if not name:
-        return setup
-    function = _function(name)
-    marked = getattr(function, _NAMES, ())
-    return replace(
-        setup,
-        task=OwnBad(
-            task=setup.task,
-            function=function,
-            bad_name=name,
-            bad_digest=file_digest(function),
-            conditions=marked or (function.__name__,),
-            graded=not marked,
-        ),
-    )
-
-
-def _function(name: str) -> Any:
-    module_name, _, function_name = name.partition(":")
-    if not module_name or not function_name:
-        raise LookupError(f"G_bad must be named as module:function, got {name!r}")
-    module = imported(module_name)
-    function = getattr(module, function_name, None)
-    if not inspect.isfunction(function):
-        there = [key for key, value in vars(module).items() if inspect.isfunction(value)]
-        nearest = difflib.get_close_matches(function_name, there, n=1, cutoff=0.0)
-        hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
-        raise LookupError(f"module {module_name!r} has no function {function_name!r}{hint}")
-    return function
 
 
 def _read_only(observed: Observed) -> Observed:

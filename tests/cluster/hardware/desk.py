@@ -19,7 +19,7 @@ from cluster.hardware.campaign import Campaign
 from cluster.hardware.identity import Approval, Identity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
-from cluster.hardware.standing import Standing
+from cluster.hardware.status import Standing
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
 

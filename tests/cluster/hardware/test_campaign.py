@@ -9,8 +9,8 @@ import pytest
 
 from cluster.hardware import campaign, journal
 from cluster.hardware.identity import Approval
-from cluster.hardware.standing import Standing, measured, planned, standing
 from cluster.hardware.states import State
+from cluster.hardware.status import Standing, measured, planned, standing
 from tests.cluster.hardware.desk import (
     DIMENSIONS,
     IDENTITY,

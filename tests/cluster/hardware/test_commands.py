@@ -3,8 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
+from cluster.cli.hardware import app
 from cluster.errors import UsageError
-from cluster.hardware.commands import app
 
 
 @pytest.fixture

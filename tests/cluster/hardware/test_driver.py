@@ -14,14 +14,14 @@ import ray
 
 from cluster.config import HardwareSettings, TrackingSettings
 from cluster.errors import UserError
-from cluster.hardware import entrance, lock, operator
+from cluster.hardware import connect, lock, operator
 from cluster.hardware.actor import HardwareActor, actor_options
 from cluster.hardware.driver import start
 from cluster.hardware.identity import Approval
 from cluster.hardware.plan import Plan, identify
-from cluster.hardware.standing import Standing
 from cluster.hardware.states import State
-from cluster.session import Session
+from cluster.hardware.status import Standing
+from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
 from tests.cluster.hardware.desk import opened, starts
 
@@ -144,7 +144,7 @@ def test_a_waiting_campaign_goes_on_when_a_person_approves(ray_session, tracker,
 
 
 def test_a_cluster_without_a_robot_is_refused(ray_session, tracker, settings, tmp_path, monkeypatch):
-    monkeypatch.setattr(entrance, "RESOURCE", "robot-arm")
+    monkeypatch.setattr(connect, "RESOURCE", "robot-arm")
     with pytest.raises(UserError, match="no machine of the Ray cluster offers the resource 'robot-arm'"):
         start(settings, ray_session, tracker, plan_in(tmp_path), lambda _: None, print)
 
@@ -189,8 +189,8 @@ def gone(robot, namespace, seconds=60.0):
 def test_a_robots_machine_that_is_taken_ends_the_command_which_names_who_took_it(
     ray_session, tracker, settings, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(entrance, "PLACE_SECONDS", 2.0)
-    monkeypatch.setattr(entrance, "NOTICE_SECONDS", 0.0)
+    monkeypatch.setattr(connect, "PLACE_SECONDS", 2.0)
+    monkeypatch.setattr(connect, "NOTICE_SECONDS", 0.0)
     joined = Session(ray_session.address, is_local=False, cpus=ray_session.cpus)
     said = []
     name = f"hardware-yumi-rehearsal in the namespace '{settings.namespace}'"
@@ -209,7 +209,7 @@ def test_a_command_interrupted_while_it_waits_leaves_nothing_behind(
     def interrupt(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(entrance, "NOTICE_SECONDS", 0.0)
+    monkeypatch.setattr(connect, "NOTICE_SECONDS", 0.0)
     joined = Session(ray_session.address, is_local=False, cpus=ray_session.cpus)
     with pytest.raises(KeyboardInterrupt):
         start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, interrupt)
@@ -225,7 +225,7 @@ def test_a_command_interrupted_while_it_waits_leaves_nothing_behind(
 def test_an_actor_that_was_there_before_survives_a_command_that_found_no_place(
     ray_session, tracker, settings, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(entrance, "PLACE_SECONDS", 2.0)
+    monkeypatch.setattr(connect, "PLACE_SECONDS", 2.0)
     options = actor_options("franka-rehearsal", settings.namespace, "detached")
     waiting = ray.remote(HardwareActor).options(**options).remote()
     with pytest.raises(UserError, match="is taken by hardware-yumi-rehearsal"):

@@ -8,8 +8,8 @@ import pytest
 from cluster.hardware import campaign, journal
 from cluster.hardware.identity import Approval, Identity
 from cluster.hardware.journal import RobotTaken
-from cluster.hardware.standing import Standing
 from cluster.hardware.states import State
+from cluster.hardware.status import Standing
 from tests.cluster.hardware.desk import carry_out, objective, opened, starts
 from workers.hardware.ledger import MotionLedger
 

@@ -13,8 +13,8 @@ from cluster.hardware import campaign, journal, operator
 from cluster.hardware.identity import Approval
 from cluster.hardware.journal import IllegalTransition
 from cluster.hardware.lock import FolderLock, FolderTaken, Process
-from cluster.hardware.standing import Standing
 from cluster.hardware.states import State
+from cluster.hardware.status import Standing
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
 
 IN_MOTION = 13

@@ -15,11 +15,12 @@ from cluster.hardware.identity import Approval, IdentityMismatch
 from cluster.hardware.lock import FolderTaken
 from cluster.hardware.plan import Plan, identify
 from cluster.hardware.proposals import Proposals, fingerprint, library_versions
-from cluster.hardware.standing import Standing
 from cluster.hardware.station import RobotTaken, Station
-from svaedc import checkpoint, methods
-from svaedc.architecture import ModelConfig
-from svaedc.model import SvaeDc
+from cluster.hardware.status import Standing
+from svaedc.bo import methods
+from svaedc.model import checkpoint
+from svaedc.model.config import ModelConfig
+from svaedc.model.svae_dc import SvaeDc
 from workers import setups
 from workers.hardware.ledger import MotionLedger
 

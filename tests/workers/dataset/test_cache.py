@@ -14,7 +14,7 @@ from workers.dataset import schema, shards
 from workers.dataset.cache import require_space, training_cache
 from workers.dataset.folder import Dataset, create
 from workers.dataset.shards import Shard
-from workers.dataset.writers import writer
+from workers.dataset.storage.temporary import writer
 
 SANE = [index for index in range(20) if index % 7 != 3]
 

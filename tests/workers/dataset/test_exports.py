@@ -9,9 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from workers.dataset import shards
-from workers.dataset.lerobot_export import export_lerobot
-from workers.dataset.moments import Moments
-from workers.dataset.numpy_export import export_npz
+from workers.dataset.exports.lerobot import Moments, export_lerobot
+from workers.dataset.exports.npz import export_npz
 
 
 @pytest.fixture

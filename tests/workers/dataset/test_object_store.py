@@ -17,19 +17,19 @@ import pytest
 
 from workers.dataset import schema, shards
 from workers.dataset.cache import training_cache
+from workers.dataset.exports.npz import export_npz
 from workers.dataset.folder import MANIFEST, Dataset, create, open_dataset
 from workers.dataset.identity import Identity
 from workers.dataset.inventory import inventory, sweep_digests
-from workers.dataset.location import Location, location
 from workers.dataset.manifest import manifest_text
-from workers.dataset.numpy_export import export_npz
-from workers.dataset.object_store import StoreError, reaching
 from workers.dataset.replacement import REPLACED, Repair
 from workers.dataset.replacement import replace as put_right
 from workers.dataset.shards import Shard
 from workers.dataset.statistics import statistics
+from workers.dataset.storage.location import Location, location
+from workers.dataset.storage.s3 import StoreError, reaching
+from workers.dataset.storage.temporary import WRITING, writer
 from workers.dataset.verification import verify
-from workers.dataset.writers import WRITING, writer
 
 FIRST, MIDDLE, LAST = Shard(0, 8), Shard(8, 16), Shard(16, 20)
 

@@ -9,8 +9,8 @@ import pytest
 
 from workers.dataset import schema, shards
 from workers.dataset.cache import training_cache
+from workers.dataset.exports.npz import export_npz
 from workers.dataset.folder import Dataset, create
-from workers.dataset.numpy_export import export_npz
 from workers.dataset.shards import Shard
 from workers.dataset.statistics import statistics
 

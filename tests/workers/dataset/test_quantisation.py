@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workers import setups
-from workers.collection import collect_shard, roll_out
+from workers.collection.recompute import rederive
+from workers.collection.shard import collect_shard, roll_out
 from workers.dataset.folder import create
 from workers.dataset.identity import Identity, identity_of
 from workers.dataset.quantisation import error_bound, restored, stored
 from workers.dataset.verification import verify
-from workers.rederivation import rederive
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from workers.dataset import schema, shards
 from workers.dataset.shards import Shard
-from workers.dataset.writers import WRITING, is_dead, wait_for_end, writer
+from workers.dataset.storage.temporary import WRITING, is_dead, wait_for_end, writer
 
 SHARD = Shard(8, 16)
 CONTENT = b"episodes " * 5000

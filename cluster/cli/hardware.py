@@ -1,0 +1,126 @@
+"""`svaedc hardware`: campaigns on one robot, and what a person decides in them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cluster.cli.options import Address, Config, Overrides, Seed, TrainedModel, services, settings_of
+from cluster.config import HardwareSettings
+from cluster.hardware import operator
+from cluster.hardware.identity import Approval
+from cluster.hardware.status import Status
+from cluster.inputs import durable
+from cluster.progress import say
+
+app = typer.Typer(
+    no_args_is_help=True,
+    help="Spend a few precious trials on one robot. Every trial is in a durable journal before it starts and "
+    "after it ends; whatever dies, the same `start` command goes on, and no trial runs twice.",
+)
+
+Folder = Annotated[
+    Path,
+    typer.Argument(help="Folder of the campaign, on a local disk of the robot's machine.", callback=durable),
+]
+TrialNumber = Annotated[int, typer.Option("--trial", min=0, help="Its number, as `status` shows it.")]
+Who = Annotated[str, typer.Option("--who", help="Your name; kept in the journal.")]
+
+
+@app.command()
+def start(
+    folder: Folder,
+    robot: Annotated[str, typer.Option("--robot", help="Which robot, such as franka-rehearsal.")],
+    method: Annotated[str, typer.Option("--method", help="How controllers are suggested.")] = "svae-dc",
+    model: TrainedModel = None,
+    trials: Annotated[
+        int, typer.Option("--trials", min=0, help="Suggested trials, after 2 random ones.")
+    ] = 10,
+    approval: Annotated[
+        Approval,
+        typer.Option(
+            "--approval", help="policy: a rehearsal runs by itself; operator: a person approves each trial."
+        ),
+    ] = Approval.POLICY,
+    pace: Annotated[
+        float, typer.Option("--pace", min=0.0, help="Least seconds of a rehearsal's trial.")
+    ] = 0.0,
+    seed: Seed = 0,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+) -> None:
+    """Carry a campaign out, or go on with it: 2 random trials, then suggested ones."""
+    from cluster.hardware.driver import start as run_start
+    from cluster.hardware.plan import Plan, identify
+    from svaedc.model.checkpoint import located
+
+    settings = settings_of(config, overrides)
+    checkpoint = located(model) if model else None
+    plan = Plan(
+        identify(robot, method, trials, seed, _pool(settings.hardware), checkpoint, approval),
+        folder,
+        checkpoint,
+        pace,
+    )
+    with services(settings, address) as (session, tracker):
+        last = run_start(settings.hardware, session, tracker, plan, _report, say)
+    _show(last)
+
+
+@app.command()
+def status(folder: Folder) -> None:
+    """How a campaign stands, trial by trial, and what it needs next."""
+    _show(operator.status(folder))
+
+
+@app.command()
+def approve(folder: Folder, trial: TrialNumber, who: Who) -> None:
+    """Let a checked trial onto the robot."""
+    operator.approve(folder, trial, who)
+    _show(operator.status(folder))
+
+
+@app.command()
+def resolve(
+    folder: Folder,
+    trial: TrialNumber,
+    outcome: Annotated[str, typer.Option("--outcome", help="measured, failed or aborted.")],
+    who: Who,
+    note: Annotated[str, typer.Option("--note", help="What you saw; kept in the journal.")],
+    f: Annotated[float | None, typer.Option("--f", help="Objective, of a measured trial.")] = None,
+    y: Annotated[float | None, typer.Option("--y", help="Badness in [0, 1], of a measured trial.")] = None,
+) -> None:
+    """Say what became of an unknown trial, once the robot stands still and is reset."""
+    operator.resolve(folder, trial, outcome, who, note, f, y)
+    _show(operator.status(folder))
+
+
+@app.command()
+def export(folder: Folder) -> None:
+    """Print the whole journal as JSON lines: the campaign, then every event."""
+    for line in operator.export(folder):
+        typer.echo(line)
+
+
+def _pool(settings: HardwareSettings) -> int:
+    return settings.pool_size
+
+
+def _report(now: Status) -> None:
+    best = "" if now.best is None else f", best objective {now.best:+.3f}"
+    say(f"{now.name}: {now.measured} of {now.planned} trials measured{best}")
+
+
+def _show(now: Status) -> None:
+    table = Table(
+        "trial", "state", "kind", "f", "y", title=f"{now.name}: {now.standing}", title_justify="left"
+    )
+    for trial in now.trials:
+        f, y = ("" if value is None else f"{value:+.3f}" for value in (trial.f, trial.y))
+        table.add_row(str(trial.number), str(trial.state), trial.kind, f, y)
+    Console().print(table)
+    if now.advice:
+        say(now.advice)

@@ -1,0 +1,75 @@
+"""Options that several commands share."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cluster.config import Part, Settings
+from cluster.inputs import durable, durable_dataset
+from cluster.runtime.signals import interruptible
+from cluster.settings import load_settings
+from workers import setups
+
+if TYPE_CHECKING:
+    from cluster.runtime.session import Session
+    from cluster.tracking import Tracker
+
+
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        help="Settings file; without it, ray_config.yaml in the working directory if there is one.",
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Any setting, over the file; may be repeated."),
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        "--address",
+        metavar="HOST:PORT",
+        help="A running Ray cluster that this machine belongs to, or auto; without it that of RAY_ADDRESS, "
+        "and without that one is started here for this command.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
+SetupName = Annotated[
+    str, typer.Option("--setup", help=f"{', '.join(setups.SETUPS)}, or a module of your own.")
+]
+DatasetFolder = Annotated[
+    Any,  # a Location, which typer does not know
+    typer.Option(
+        "--dataset", metavar="PLACE", help="Its folder, or s3://bucket/prefix.", parser=durable_dataset
+    ),
+]
+ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.", callback=durable)]
+TrainedModel = Annotated[
+    Path | None, typer.Option("--model", help="Folder of a trained model.", callback=durable)
+]
+
+
+def settings_of(config: Path | None, overrides: list[str] | None) -> Settings:
+    """The settings of a command."""
+    return load_settings(config, overrides or [])
+
+
+@contextmanager
+def services(
+    settings: Settings, address: str | None, parts: tuple[Part, ...] = ("dashboard",)
+) -> Iterator[tuple["Session", "Tracker"]]:
+    """The tracker, whose store must exist before anything else starts, and the Ray session."""
+    from cluster.runtime.session import connect
+    from cluster.tracking import open_tracker
+
+    store = settings.tracking.uri.removeprefix("sqlite:///")
+    if store != settings.tracking.uri:
+        durable(Path(store))
+    tracker = open_tracker(settings.tracking)
+    with interruptible(), connect(settings.ray, address, parts) as session:
+        yield session, tracker

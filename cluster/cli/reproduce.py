@@ -1,0 +1,107 @@
+"""`svaedc reproduce`: a figure of the paper, from data to picture."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cluster.cli.options import Address, Config, Overrides, services, settings_of
+from cluster.config import Settings
+from cluster.errors import UsageError
+from cluster.inputs import durable, durable_dataset, usage_errors
+from workers.dataset.storage.location import Location
+
+_SCALE_HELP = (
+    "machine: what two cores collect in up to an hour; paper: 500,000 episodes and its own training."
+)
+
+
+Figure = Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13.")]
+Folder = Annotated[
+    Path, typer.Option("--folder", help="Of data, models and results; shared by figures.", callback=durable)
+]
+ScaleName = Annotated[str, typer.Option("--scale", help=_SCALE_HELP)]
+Episodes = Annotated[
+    int | None, typer.Option("--episodes", min=200, help="To collect, instead of the scale's.")
+]
+Runs = Annotated[
+    int | None, typer.Option("--runs", min=1, max=1000, help="Of each method, instead of the paper's.")
+]
+Given = Annotated[
+    Any,  # a Location, which typer does not know
+    typer.Option(
+        "--dataset", metavar="PLACE", help="Collected already; used as it is.", parser=durable_dataset
+    ),
+]
+Models = Annotated[
+    list[Path] | None,
+    typer.Option("--model", help="Trained already; may be repeated, one of each latent size."),
+]
+Plan = Annotated[bool, typer.Option("--plan", help="Only say what it will cost.")]
+
+
+def reproduce(
+    figure: Figure,
+    folder: Folder = Path("reproduction"),
+    scale: ScaleName = "machine",
+    episodes: Episodes = None,
+    runs: Runs = None,
+    dataset: Given = None,
+    model: Models = None,
+    config: Config = None,
+    overrides: Overrides = None,
+    address: Address = None,
+    *,
+    plan: Plan = False,
+) -> None:
+    """Make a figure of the paper: collect, train, compare, and hold the numbers against what it claims.
+
+    It says first what that costs. It may be interrupted: the same command goes on, and keeps what is done.
+    Figures 4 and 7 need robots: here simulated stand-ins take their place, and are called so everywhere.
+
+    Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
+    `svaedc reproduce figure-7 --runs 50`
+    """
+    from cluster.reproduction import figures
+    from cluster.reproduction import plan as scales
+    from cluster.reproduction.plan import resolved
+    from cluster.reproduction.run import reproduce as run_reproduction
+
+    settings = settings_of(config, overrides)
+    _require_consistent(settings, dataset, episodes)
+    with usage_errors():
+        recipe, size = figures.recipe(figure), scales.scale(scale)
+    reproduction = resolved(
+        recipe,
+        size,
+        folder,
+        episodes=episodes or size.episodes.get(recipe.data, 0),
+        runs=runs or recipe.runs,
+        dataset=dataset,
+        models=tuple(path.expanduser().absolute() for path in model or ()),
+    )
+    if plan:
+        _foretell(reproduction, settings, address)
+        return
+    with services(settings, address) as (session, tracker):
+        run_reproduction(reproduction, settings, session, tracker)
+
+
+def _foretell(reproduction: Any, settings: Settings, address: str | None) -> None:
+    """Starts nothing; a cluster that runs is asked for its CPUs."""
+    from cluster.reproduction.plan import cores
+    from cluster.reproduction.run import foretell
+    from cluster.runtime.session import connect
+
+    if not address:
+        foretell(reproduction, settings, cores(settings))
+        return
+    with connect(settings.ray, address) as session:
+        foretell(reproduction, settings, session.cpus)
+
+
+def _require_consistent(settings: Settings, dataset: Location | None, episodes: int | None) -> None:
+    if settings.train.latent != "preset":
+        raise UsageError("a figure's panels decide the size of the latent path: leave train.latent out")
+    if dataset is not None and episodes is not None:
+        raise UsageError("--episodes says how many to collect, --dataset is collected already: leave one out")

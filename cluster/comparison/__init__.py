@@ -1,0 +1,1 @@
+"""`svaedc compare`: methods side by side, on Ray Tune."""

@@ -1,0 +1,100 @@
+"""`svaedc compare`: submit the missing runs of a plan to Ray Tune, gather their trials, record."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cluster.comparison.folder import alone_in, claim
+from cluster.comparison.plan import Plan, described
+from cluster.comparison.records import TABLE, RunKey, all_runs, recorded, seeds_in
+from cluster.comparison.report import FIGURE, PAGE, SUMMARY, lines, publish, summary_of
+from cluster.comparison.tracking import Note, TrackedComparison, begin, note_in
+from cluster.comparison.tune import Standing, Watch, submit
+from cluster.progress import ProgressLine, say
+from cluster.runtime.session import Session
+from cluster.tracking import Run, Tracker
+from svaedc.analysis.summary import Summary
+from svaedc.bo.loop import Trial
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison ends with.
+
+    Attributes:
+        summary: of every run in its folder.
+        url: of its MLflow run.
+    """
+
+    summary: Summary
+    url: str
+
+
+def compare(plan: Plan, session: Session, tracker: Tracker) -> Comparison:
+    """Run what is missing of a comparison, then summarise all of it.
+
+    Args:
+        plan: what it compares.
+        session: where it runs.
+        tracker: that records it.
+
+    Raises:
+        UserError: the folder holds another comparison or cannot be written, runs kept failing, or MLflow
+            lacks some of the results.
+    """
+    folder = plan.job.folder
+    session.preflight(plan.slots)
+    with alone_in(folder):
+        plan.grid.require_purpose(folder, seeds_in(folder))
+        parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
+        note = note_in(folder, tracker)
+        runs = dict(all_runs(folder))
+        plan.require_length(runs)
+        if _is_finished(plan, note, runs):
+            say(f"{folder} holds the whole comparison: nothing to do")
+            summary = summary_of(plan.job, plan.setup, list(runs.items()))
+            return Comparison(summary, Run(tracker, note.run).url)
+        tracked = begin(folder, tracker, f"compare {plan.setup.name}", parameters)
+        with tracked.run:
+            _submit(plan, tracked, runs)
+            return Comparison(_record(plan, tracked, parameters), tracked.run.url)
+
+
+def _is_finished(plan: Plan, note: Note, runs: Mapping[RunKey, Sequence[Trial]]) -> bool:
+    """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
+    whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
+    return whole and all((plan.job.folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
+
+
+def _submit(plan: Plan, tracked: TrackedComparison, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
+    folder, keys, length = plan.job.folder, plan.grid.keys(), plan.job.length
+    missing = plan.missing(runs)
+    if not missing:
+        return
+
+    def ended(key: RunKey) -> None:
+        trials = recorded(key.path(folder))
+        if len(trials) >= length:
+            tracked.try_child(key, trials)
+
+    standing = Standing(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
+    done = sum(min(len(runs.get(key, ())), length) for key in keys)
+    with ProgressLine("trials", len(keys) * length, done) as progress:
+        submit(plan.job, missing, plan.slots, Watch(progress, standing, ended))
+
+
+def _record(plan: Plan, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
+    runs = list(all_runs(plan.job.folder))
+    summary = summary_of(plan.job, plan.setup, runs)
+    settings = {**parameters, **described(key for key, _ in runs), "MLflow run": tracked.run.url}
+    report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
+    for line in lines(summary):
+        say(line)
+    say(f"{plan.job.folder / PAGE}; {tracked.run.url}")
+    asked = set(plan.grid.keys())
+    for key, trials in runs:
+        if key in asked:
+            tracked.child(key, trials)
+    curves = {f"best/{name}": [best.mean for best in method.best] for name, method in summary.methods.items()}
+    tracked.complete(report, curves, sum(len(trials) for _, trials in runs))
+    return summary

@@ -1,0 +1,146 @@
+"""Files of a comparison: one growing record per run, and one table of all trials."""
+
+import fcntl
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count, takewhile
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from cluster.errors import UserError
+from cluster.files import replacing
+from svaedc.analysis.summary import Row
+from svaedc.bo.loop import Trial
+
+RUNS = "runs"
+TABLE = "trials.parquet"
+_NAME = re.compile(r"(?P<method>.+)-(?P<run>\d{5,})\.jsonl")
+
+
+@dataclass(frozen=True, order=True)
+class RunKey:
+    """A method and the seed it runs with."""
+
+    method: str
+    run: int
+
+    def __str__(self) -> str:
+        return f"{self.method} {self.run}"
+
+    def path(self, folder: Path) -> Path:
+        """Where the run's trials are recorded."""
+        return folder / RUNS / f"{self.method}-{self.run:05d}.jsonl"
+
+
+Runs = Sequence[tuple[RunKey, list[Trial]]]
+
+
+def append(path: Path, trial: Trial) -> None:
+    """Add a trial to a run's record; it is on disk when this returns."""
+    with path.open("ab+") as file:
+        # A worker whose driver died may still be at it.
+        fcntl.flock(file, fcntl.LOCK_EX)
+        _drop_torn_line(file)
+        file.write(json.dumps(_fields(trial)).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _drop_torn_line(file: BinaryIO) -> None:
+    """Remove a last line that a kill or a full disk cut off."""
+    file.seek(0)
+    text = file.read()
+    whole = text.rfind(b"\n") + 1
+    if whole < len(text):
+        file.truncate(whole)
+
+
+def recorded(path: Path) -> list[Trial]:
+    """The trials of a run so far, up to the first that is absent.
+
+    A last line that was cut off counts as absent. Of a trial recorded twice, by a worker that outlived its
+    driver, the first counts; they differ in nothing but their seconds.
+
+    Raises:
+        UserError: a whole line is no trial.
+    """
+    if not path.exists():
+        return []
+    trials: dict[int, Trial] = {}
+    for number, line in enumerate(path.read_bytes().split(b"\n")[:-1], start=1):
+        try:
+            trial = _trial(json.loads(line))
+        except (ValueError, TypeError, KeyError) as error:
+            raise UserError(
+                f"line {number} of {path} is not the record of a trial; delete the file, "
+                "and the same command repeats that one run"
+            ) from error
+        trials.setdefault(trial.index, trial)
+    return [trials[index] for index in takewhile(trials.__contains__, count())]
+
+
+def _trial(line: dict[str, Any]) -> Trial:
+    x = np.array(line.pop("x"), dtype=np.float32)
+    return Trial(index=line.pop("trial"), x=x, **line)
+
+
+def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
+    """Every run of a comparison that has begun, in order."""
+    for key in sorted(_begun(folder)):
+        yield key, recorded(key.path(folder))
+
+
+def seeds_in(folder: Path) -> set[int]:
+    """Of all runs that have begun."""
+    return {key.run for key in _begun(folder)}
+
+
+def _begun(folder: Path) -> Iterator[RunKey]:
+    """Of files that are no run's, such as copies, nothing is said."""
+    for path in (folder / RUNS).glob("*.jsonl"):
+        match = _NAME.fullmatch(path.name)
+        if match:
+            yield RunKey(match["method"], int(match["run"]))
+
+
+def rows(runs: Runs) -> list[Row]:
+    """What the statistics need of every trial."""
+    return [
+        Row(key.method, key.run, trial.index, trial.f, trial.success)
+        for key, trials in runs
+        for trial in trials
+    ]
+
+
+def write_table(folder: Path, runs: Runs, *, setup: str, gap: str) -> Path:
+    """`trials.parquet`: one row per trial of all runs."""
+    records = [
+        {"setup": setup, "gap": gap, "method": key.method, "run": key.run, **_fields(trial)}
+        for key, trials in runs
+        for trial in trials
+    ]
+    with replacing(folder / TABLE) as path:
+        pq.write_table(pa.Table.from_pylist(records), path, compression="zstd")
+    return folder / TABLE
+
+
+def _fields(trial: Trial) -> dict[str, Any]:
+    """A trial as plain values, in the order of the table."""
+    return {
+        "trial": trial.index,
+        "f": trial.f,
+        "y": trial.y,
+        "best": trial.best,
+        "success": trial.success,
+        "status": trial.status,
+        "seconds": trial.seconds,
+        "stop": trial.stop,
+        "x": trial.x.tolist(),
+    }

@@ -1,0 +1,114 @@
+"""What MLflow has of a comparison, noted in its folder, so that an interruption loses and repeats nothing."""
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from cluster.comparison.folder import writing
+from cluster.comparison.records import RunKey
+from cluster.comparison.report import Report
+from cluster.errors import UserError
+from cluster.files import replacing
+from cluster.progress import say
+from cluster.tracking import Run, Tracker
+from svaedc.bo.loop import Trial
+
+NOTE = "mlflow.json"
+
+
+@dataclass(frozen=True)
+class Note:
+    """What MLflow has.
+
+    Attributes:
+        run: the newest parent run.
+        parameters: its own; the same command goes on with it.
+        children: runs that have a child run, with their number of trials.
+        trials: in the table when the parent run was completed; 0 before.
+    """
+
+    run: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    children: tuple[str, ...] = ()
+    trials: int = 0
+
+
+def note_in(folder: Path, tracker: Tracker) -> Note:
+    """The note of a folder, if it speaks of this store.
+
+    One that is damaged, or speaks of another store, counts for nothing: MLflow then gets everything again.
+    """
+    with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
+        content = json.loads((folder / NOTE).read_text())
+        note = Note(**{**content, "children": tuple(content["children"])})
+        if tracker.holds(note.run):
+            return note
+    return Note()
+
+
+def begin(folder: Path, tracker: Tracker, name: str, parameters: Mapping[str, Any]) -> "TrackedComparison":
+    """The run that an interrupted command of the same parameters began, or a new one."""
+    note = note_in(folder, tracker)
+    if note.run and note.parameters == parameters and not note.trials:
+        return TrackedComparison(folder, note, tracker.resume(note.run))
+    run = tracker.run(name, "compare", parameters)
+    return TrackedComparison(folder, replace(note, run=run.id, parameters=parameters, trials=0), run)
+
+
+class TrackedComparison:
+    """The parent run of one command, with a child run for every run of the comparison that is whole."""
+
+    def __init__(self, folder: Path, note: Note, run: Run) -> None:
+        self._folder = folder
+        self._note = note
+        self._failed = False
+        self.run = run
+        self._save()
+
+    def try_child(self, key: RunKey, trials: list[Trial]) -> None:
+        """Record a run that has just ended; a store that fails stops no comparison.
+
+        It is then left alone until the end: MLflow tries a server that is away for minutes each time.
+        """
+        if self._failed:
+            return
+        try:
+            self.child(key, trials)
+        except UserError as error:
+            self._failed = True
+            say(f"{error}. The comparison goes on; what MLflow lacks is recorded at its end")
+
+    def child(self, key: RunKey, trials: list[Trial]) -> None:
+        """Record a run, unless MLflow has it.
+
+        Raises:
+            UserError: the store cannot be written.
+        """
+        name = f"{key}: {len(trials)} trials"
+        if name in self._note.children:
+            return
+        with self.run.child(str(key), {"method": key.method, "run": key.run}) as run:
+            run.curves({name: [getattr(trial, name) for trial in trials] for name in ("f", "y", "best")})
+        self._note = replace(self._note, children=(*self._note.children, name))
+        self._save()
+
+    def complete(self, report: Report, curves: Mapping[str, list[float]], trials: int) -> None:
+        """Record the results of the whole comparison.
+
+        Raises:
+            UserError: the store cannot be written.
+        """
+        for path in report.files:
+            self.run.file(path)
+        for path in report.figures:
+            self.run.figure(path)
+        self.run.curves(curves)
+        self._note = replace(self._note, trials=trials)
+        self._save()
+
+    def _save(self) -> None:
+        with writing(self._folder), replacing(self._folder / NOTE) as path:
+            path.write_text(json.dumps(asdict(self._note), indent=2) + "\n")

@@ -1,0 +1,1 @@
+"""`svaedc collect` and what `svaedc dataset` does to a folder."""

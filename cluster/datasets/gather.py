@@ -1,0 +1,157 @@
+"""The work of a collection: plan the missing shards, submit them to a pool of actors, gather, clean up."""
+
+import errno
+import sys
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import ray
+
+from cluster.config import CollectSettings
+from cluster.datasets.progress import Recorder, Tally
+from cluster.datasets.quarantine import put_aside
+from cluster.datasets.worker import RolloutActor
+from cluster.errors import UserError
+from cluster.progress import ProgressLine, say
+from cluster.runtime.actor_pool import Done, Failed, Limits, Pool
+from cluster.tracking import Run
+from workers.collection.shard import ShardReport
+from workers.dataset import shards
+from workers.dataset.folder import Dataset, create
+from workers.dataset.identity import Identity
+from workers.dataset.inventory import sweep_digests
+from workers.dataset.shards import Shard
+from workers.dataset.storage.location import Location
+from workers.dataset.storage.temporary import wait_for_end
+
+_DISK = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
+    *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
+}
+
+_ENDING_SECONDS = 10.0
+"""What a worker process may take to end once it was told to."""
+
+LAST_REPORTS = 1024
+"""Reports that are kept; a plan is made from fewer."""
+
+Outcome = Done[Shard, ShardReport] | Failed[Shard]
+
+
+def planned(identity: Identity, episodes: int, folder: Location) -> tuple[Dataset, list[Shard]]:
+    """The dataset in a folder, begun if need be, and the shards that are missing in it.
+
+    Raises:
+        UserError: the folder holds another dataset, or cannot be written.
+    """
+    try:
+        dataset = create(folder, identity)
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    swept = shards.sweep(folder)
+    if swept:
+        say(f"removed {swept} unfinished files of processes that are gone")
+    return dataset, dataset.missing(episodes)
+
+
+def growth(settings: CollectSettings) -> int:
+    """How many actors there may be as CPUs become free: as many as are asked for."""
+    return sys.maxsize if settings.actors == "all" else settings.actors
+
+
+def rollout_pool(
+    dataset: Dataset,
+    settings: CollectSettings,
+    actors: int,
+    actor: type[RolloutActor] = RolloutActor,
+    most: int = 0,
+) -> Pool[Shard, ShardReport]:
+    """Actors that roll out shards of a dataset, one CPU each; as many more as become free, up to `most`."""
+    remote: Any = ray.remote(actor)
+    options = remote.options(num_cpus=1, max_restarts=0, max_task_retries=0)
+    return Pool(
+        spawn=lambda: options.remote(dataset.identity.setup, str(dataset.folder.resolve())),
+        submit=lambda worker, shard: worker.collect.remote(shard),
+        size=actors,
+        limits=Limits(
+            in_flight=settings.shards_in_flight_per_actor,
+            attempts=settings.attempts_per_shard,
+            seconds=settings.shard_timeout_seconds,
+        ),
+        most=most,
+    )
+
+
+def work(
+    dataset: Dataset,
+    plan: list[Shard],
+    episodes: int,
+    tally: Tally,
+    run: Run,
+    pool: Pool[Shard, ShardReport],
+) -> list[ShardReport]:
+    """Collect the shards of a plan; returns the reports of the last ones.
+
+    Raises:
+        UserError: the disk is full, or no actor can start.
+    """
+    try:
+        with pool:
+            return _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+    finally:
+        _clean(dataset, pool.answers)
+
+
+def _clean(dataset: Dataset, writers: list[str]) -> None:
+    """Leave no unfinished file behind, however the work ended."""
+    wait_for_end(writers, _ENDING_SECONDS)
+    try:
+        shards.sweep(dataset.folder)
+        sweep_digests(dataset)
+    except OSError as error:  # a store that is away; how the work ended matters more
+        say(f"unfinished files may be left in {dataset.folder}, which the next collection removes: {error}")
+
+
+def _gather(
+    outcomes: Iterable[Outcome], dataset: Dataset, episodes: int, tally: Tally, recorder: Recorder
+) -> list[ShardReport]:
+    reports: deque[ShardReport] = deque(maxlen=LAST_REPORTS)
+    left = sum(shard.episodes for shard in dataset.missing(episodes))
+    with ProgressLine("episodes", episodes, episodes - left) as progress:
+        for outcome in outcomes:
+            if isinstance(outcome, Failed):
+                note_failure(outcome, dataset, tally)
+                continue
+            tally.add(outcome.result)
+            reports.append(outcome.result)
+            progress.advance(outcome.item.episodes, tally.note())
+            recorder.record(tally)
+    return list(reports)
+
+
+def note_failure(failure: Failed[Shard], dataset: Dataset, tally: Tally) -> None:
+    """Say it, keep its error, and put the shard aside after its last attempt.
+
+    Raises:
+        UserError: it is the disk's fault, which no further attempt changes.
+    """
+    if isinstance(failure.cause, OSError) and failure.cause.errno in _DISK:
+        raise _unwritable(dataset, failure.cause)
+    tally.errors[failure.item].append(failure.text)
+    if failure.attempts_left:
+        tally.retries += 1
+        say(f"{failure.item.name} failed and is tried again: {failure.error}")
+        return
+    try:
+        path = put_aside(dataset, failure.item, tally.errors[failure.item])
+    except OSError as error:
+        raise _unwritable(dataset, error) from error
+    say(f"{failure.item.name} was given up, its errors are in {path}: {failure.error}")
+
+
+def _unwritable(dataset: Dataset, error: OSError) -> UserError:
+    return UserError(
+        f"cannot write to {dataset.folder}: {error.strerror}. The shards in it are safe; make room, "
+        "or let it be written to, and run the same command again"
+    )

@@ -1,0 +1,155 @@
+"""The way to the robot: its one actor found or made, waited for, and left again."""
+
+import gc
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from math import inf
+from typing import Any
+
+import ray
+from ray.exceptions import ActorAlreadyExistsError, ActorDiedError
+from ray.util import list_named_actors
+
+from cluster.errors import UserError
+from cluster.hardware.actor import PREFIX, RESOURCE, HardwareActor
+from cluster.hardware.plan import Plan
+from cluster.hardware.status import Status
+from cluster.runtime.machines import has_a_place
+
+POLL_SECONDS = 0.5
+ENTRANCES = 10
+LEAVE_SECONDS = 5.0
+NOTICE_SECONDS = 10.0
+"""After this a person is told what the command waits for."""
+PLACE_SECONDS = 120.0
+"""An actor gets a place on the robot's machine within this, or the command ends."""
+
+Say = Callable[[str], None]
+
+
+def require_robot_host() -> None:
+    """Refuses a cluster without a robot.
+
+    Raises:
+        UserError: when no machine offers the resource.
+    """
+    if ray.cluster_resources().get(RESOURCE, 0.0) < 1.0:
+        raise UserError(
+            f"no machine of the Ray cluster offers the resource {RESOURCE!r}; start the robot's machine "
+            f"with: ray start --resources '{{\"{RESOURCE}\": 1}}'"
+        )
+
+
+@contextmanager
+def at_the_robot(options: dict[str, Any], plan: Plan, say: Say) -> Iterator[tuple[Any, Status]]:
+    """The robot's actor, the plan entered; it ends after its present trial, whatever happens to the driver.
+
+    Args:
+        options: of the actor, `actor_options`.
+        plan: what to carry out.
+        say: is told what the command waits for.
+
+    Raises:
+        UserError: when there is no place on the robot's machine, or the plan cannot be carried out.
+    """
+    actor, first = _entered(options, plan, say)
+    try:
+        yield actor, first
+    finally:
+        _withdraw(actor, plan)
+
+
+def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status]:
+    deadline, made = time.monotonic() + PLACE_SECONDS, 0
+    while made < ENTRANCES and time.monotonic() < deadline:
+        actor, is_new = _obtained(options)
+        made += is_new
+        try:
+            return actor, _admitted(actor, options, plan, deadline, say)
+        except ActorDiedError:
+            # An earlier driver's actor on its way out: entering moves nothing, so it may be tried again.
+            del actor
+            time.sleep(POLL_SECONDS)
+        except BaseException:
+            if is_new:
+                _end(actor, plan)
+            raise
+    raise _short_lived(options)
+
+
+def _obtained(options: dict[str, Any]) -> tuple[Any, bool]:
+    """The robot's actor, and whether it is new: one that was there before is not for this command to end."""
+    gc.collect()  # a name means its dead actor for as long as a handle of that one lives in this process
+    for _ in range(ENTRANCES):
+        with suppress(ValueError):
+            return ray.get_actor(options["name"], options["namespace"]), False
+        with suppress(ActorAlreadyExistsError):  # made by another command a moment ago
+            return ray.remote(HardwareActor).options(**options).remote(), True
+    raise _short_lived(options)
+
+
+def _short_lived(options: dict[str, Any]) -> UserError:
+    return UserError(
+        f"the actor {options['name']} dies whenever it starts; look into the Ray logs of the robot's machine"
+    )
+
+
+def _admitted(actor: Any, options: dict[str, Any], plan: Plan, deadline: float, say: Say) -> Status:
+    """Waits up to the deadline for an actor without a place, and for one at work until it answers.
+
+    A trial under way may take any time, and nothing here can tell its end from outside.
+    """
+    answer, notice = actor.enter.remote(plan), time.monotonic() + NOTICE_SECONDS
+    while not ray.wait([answer], timeout=POLL_SECONDS)[0]:
+        is_busy = has_a_place(actor)
+        if time.monotonic() >= notice:
+            say(_at_work(plan) if is_busy else f"waiting for a place: {_no_place(_others(options))}")
+            notice = inf
+        if not is_busy and time.monotonic() >= deadline:
+            require_robot_host()
+            raise UserError(_no_place(_others(options)))
+    return ray.get(answer)
+
+
+def _end(actor: Any, plan: Plan) -> None:
+    """Ends an actor that this command made in vain: it never asked it for a trial.
+
+    One without a place would take it later, for nobody, and what is asked of it now dies with this command.
+    """
+    if has_a_place(actor):
+        _withdraw(actor, plan)
+    else:
+        ray.kill(actor)
+
+
+def _withdraw(actor: Any, plan: Plan) -> None:
+    ray.wait([actor.withdraw.remote(plan)], timeout=LEAVE_SECONDS)
+
+
+def _others(options: dict[str, Any]) -> list[str]:
+    """The actors of other campaigns, in every namespace."""
+    own = (options["namespace"], options["name"])
+    listed: list[Any] = list_named_actors(all_namespaces=True)
+    found = sorted((entry["namespace"], entry["name"]) for entry in listed)
+    return [
+        f"{name} in the namespace {namespace!r}"
+        for namespace, name in found
+        if name.startswith(PREFIX) and (namespace, name) != own
+    ]
+
+
+def _no_place(others: list[str]) -> str:
+    if others:
+        return (
+            f"the robot's machine is taken by {', '.join(others)}; wait until that campaign has ended or, if "
+            "its command was killed, repeat that command, which ends what it left behind"
+        )
+    return (
+        "the process at the robot does not start, and no other campaign is there; other work holds the "
+        f"resource {RESOURCE!r} (see ray status), or the robot's machine is too busy (see its Ray logs)"
+    )
+
+
+def _at_work(plan: Plan) -> str:
+    return f"the process at {plan.identity.robot} is at work, on a trial perhaps; waiting until it has ended"

@@ -1,0 +1,103 @@
+"""What users name: paths, datasets and setups, checked where they enter."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from cluster.errors import UsageError, UserError
+from workers import setups
+from workers.dataset.storage.location import Location, location
+from workers.setups import Setup
+from workers.setups.user_bad import with_bad
+
+
+def durable(path: Path | None) -> Path | None:
+    """An absolute path that outlives the command.
+
+    Raises:
+        UsageError: the path is relative inside a submitted job, where it would lie in a temporary copy of the
+            working directory that Ray deletes.
+    """
+    if path is None:
+        return None
+    if not path.is_absolute() and "working_dir_files" in Path.cwd().parts:
+        raise UsageError(
+            f"{path} would be deleted with the job's copy of the working directory; "
+            "give an absolute path that every machine of the cluster sees, or, for a campaign on hardware, "
+            "one on a local disk of the robot's machine"
+        )
+    return path.expanduser().absolute()
+
+
+def dataset_location(text: str) -> Location:
+    """Where a dataset lies: a folder, or `s3://bucket/prefix`.
+
+    What the environment says of the store becomes part of its address, so that every process goes to the same
+    one, wherever it runs. Credentials never do.
+
+    Raises:
+        UsageError: it has a scheme, but is no address of an object store.
+    """
+    try:
+        place = location(text)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    return place.expanduser() if isinstance(place, Path) else place.at(_store_of_environment())
+
+
+def _store_of_environment() -> dict[str, str]:
+    """The options of an address that the standard variables of AWS give, those that are set."""
+    endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL", "")
+    parts = urlsplit(endpoint)
+    options = {
+        "endpoint_override": parts.netloc,
+        "region": os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION", ""),
+        "scheme": parts.scheme,
+    }
+    return {name: value for name, value in options.items() if value}
+
+
+def durable_dataset(text: str) -> Location:
+    """The same; a relative path is refused where `durable` refuses it."""
+    place = dataset_location(text)
+    if isinstance(place, Path):
+        durable(place)
+        return place.absolute()
+    return place
+
+
+def setup_of(name: str, bad: str = "") -> Setup:
+    """The setup of that name, with G_bad of that name unless it is ""; an unknown one is a usage error.
+
+    Users' modules are found in the working directory too, after everything that is installed.
+    """
+    sys.path.append(str(Path.cwd()))
+    with usage_errors():
+        return with_bad(setups.load(name), bad)
+
+
+def working(setup: Setup, seed: int) -> Setup:
+    """The setup, tried out if users supplied a part of it: before anything starts or claims a folder.
+
+    Raises:
+        UserError: it does not work.
+    """
+    from workers.collection.shard import require_working
+
+    try:
+        require_working(setup, seed)
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    return setup
+
+
+@contextmanager
+def usage_errors() -> Iterator[None]:
+    """Turns an unknown name or an impossible value into a usage error with the same message."""
+    try:
+        yield
+    except (LookupError, ValueError) as error:
+        raise UsageError(error.args[0]) from error

@@ -1,0 +1,37 @@
+"""A trained model that a user names, by its folder or its file."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cluster.errors import UserError
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
+
+
+class TrainedModel(NamedTuple):
+    """A model in evaluation mode, the file it is from, and what else that holds."""
+
+    path: Path
+    model: SvaeDc
+    metadata: dict[str, Any]
+
+
+def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
+    """The model in a folder or file.
+
+    Args:
+        path: folder that `svaedc train` left, or the checkpoint in it.
+        setup: that it must have been trained on.
+        twin: another setup that will do as well.
+
+    Raises:
+        UserError: it cannot be read, or was trained on another setup.
+    """
+    file = checkpoint.located(path)
+    try:
+        model, metadata = checkpoint.load(file)
+        trained_on = twin if twin and metadata.get("setup") == twin else setup
+        checkpoint.require(file, metadata, {"setup": trained_on})
+    except (FileNotFoundError, ValueError) as error:
+        raise UserError(f"cannot use the model: {error}") from error
+    return TrainedModel(file, model, metadata)

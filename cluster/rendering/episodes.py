@@ -1,0 +1,114 @@
+"""The episode that a person asks to see: of a controller given in one of four ways."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from cluster.errors import UsageError, UserError
+from cluster.inputs import dataset_location
+from workers.controllers.controller import unit_cube
+from workers.dataset.folder import Dataset, open_dataset
+from workers.physics import Physics
+from workers.randomness import generator
+from workers.rollout import Episode, rollout
+from workers.setups import Setup
+
+FORMS = "random:SEED, dataset:FOLDER:INDEX, the path of an .npy file, or numbers separated by commas"
+
+
+def exhibit(wanted: str, setup: Setup, seed: int | None) -> Episode:
+    """The episode of a controller; one of a dataset comes as it was recorded.
+
+    Args:
+        wanted: one of `FORMS`.
+        setup: what runs the controller.
+        seed: of the physics, drawn from the ranges of data collection. Without it an episode of a dataset
+            keeps its own, and other controllers run under the nominal physics.
+
+    Raises:
+        UsageError: there is no such controller.
+        UserError: the dataset cannot be read.
+    """
+    kind, _, rest = wanted.partition(":")
+    if kind == "dataset":
+        recorded = _recorded(wanted, rest, setup)
+        return recorded if seed is None else _performed(setup, recorded.x, drawn(setup, seed))
+    x = _random(wanted, rest, setup) if kind == "random" else _given(wanted, setup)
+    return _performed(setup, x, setup.physics.middle() if seed is None else drawn(setup, seed))
+
+
+def drawn(setup: Setup, seed: int) -> Physics:
+    """The physics of episode 0 of a dataset with that seed."""
+    return setup.physics.draw(generator(seed, "physics", 0))
+
+
+def _performed(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
+    with setup.open() as environment:
+        return rollout(setup, environment, x, physics)
+
+
+def _random(wanted: str, seed: str, setup: Setup) -> np.ndarray:
+    """The controller of episode 0 of a dataset with that seed."""
+    number = _whole(wanted, seed, "SEED")
+    return generator(number, "controller", 0).random(setup.dimensions, dtype=np.float32)
+
+
+def _whole(wanted: str, text: str, name: str) -> int:
+    if not (text.isascii() and text.isdigit()):
+        raise UsageError(f"--x {wanted}: {name} must be a whole number from 0, got {text!r}; use {FORMS}")
+    return int(text)
+
+
+def _given(wanted: str, setup: Setup) -> np.ndarray:
+    with _explained(wanted, setup):
+        if wanted.endswith(".npy"):
+            return unit_cube(np.load(Path(wanted).expanduser(), allow_pickle=False), setup.dimensions)
+        return unit_cube([float(number) for number in wanted.split(",")], setup.dimensions)
+
+
+@contextmanager
+def _explained(wanted: str, setup: Setup) -> Iterator[None]:
+    shown = wanted if len(wanted) <= 60 else wanted[:57] + "..."
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        raise UsageError(
+            f"--x {shown}: {error}; {setup.name} takes {setup.dimensions} numbers in [0, 1], "
+            f"and --x may be {FORMS}"
+        ) from error
+
+
+def _recorded(wanted: str, rest: str, setup: Setup) -> Episode:
+    folder, _, place = rest.rpartition(":")
+    if not folder:
+        raise UsageError(f"--x {wanted} names no episode; write dataset:FOLDER:INDEX")
+    index = _whole(wanted, place, "INDEX")
+    try:
+        dataset = open_dataset(dataset_location(folder))
+        _require_same(dataset, setup)
+        return dataset.episode(index)
+    except IndexError as error:
+        raise UsageError(str(error)) from error
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def _require_same(dataset: Dataset, setup: Setup) -> None:
+    identity = dataset.identity
+    if identity.setup != setup.name:
+        raise UsageError(
+            f"{dataset.folder} is of {identity.setup}, not of {setup.name}; use --setup {identity.setup}"
+        )
+    if identity.bad_name:
+        raise UsageError(
+            f"{dataset.folder} was collected under the G_bad {identity.bad_name}, and a picture shows the "
+            "setup's own; give the controller itself to --x instead"
+        )
+    channels = tuple(channel.name for channel in setup.observation)
+    if (tuple(row[0] for row in identity.observation), identity.conditions) != (channels, setup.conditions):
+        raise UserError(
+            f"{dataset.folder} was collected when {setup.name} had other channels or conditions; "
+            "collect it anew"
+        )

@@ -1,0 +1,202 @@
+"""Episodes and what a model makes of them: original, reconstructed and generated, each with its badness."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from cluster.errors import UsageError, UserError
+from cluster.files import replacing
+from cluster.inputs import setup_of
+from cluster.models import trained_model
+from cluster.progress import ProgressLine, say
+from cluster.rendering.frames import Moment, captioned, headed, stills, summary
+from cluster.rendering.video import STILLS, Picture, mosaic, write
+from svaedc.model.reconstruction import Rendition, remarkable, renditions
+from svaedc.model.svae_dc import SvaeDc
+from workers.dataset.cache import TrainingCache
+from workers.dataset.folder import Dataset
+from workers.rendering import Size, frames, scenery_of
+from workers.rollout import Episode, degrees, sampled
+from workers.setups import Setup
+
+ACROSS = 2  # blocks beside each other
+GAP = 6  # pixels
+DOWN = 3  # moments below each other in a block of stills
+SMALL = Size(160, 120)
+RATE = 4  # pictures per second of the clip that a training leaves
+
+
+@dataclass(frozen=True)
+class Telling:
+    """An episode and what a model makes of it.
+
+    Attributes:
+        title: written above.
+        episode: as it was recorded.
+        told: by the model, at its training stride.
+        stride: control steps between two of the model's.
+    """
+
+    title: str
+    episode: Episode
+    told: tuple[Rendition, ...]
+    stride: int
+
+
+def telling(title: str, episode: Episode, model: SvaeDc, stride: int) -> Telling:
+    """What a model makes of an episode.
+
+    Raises:
+        ValueError: the episode is not of the sizes that the model was trained on.
+    """
+    steps = sampled(episode.xi.shape[1], stride)
+    found = (len(episode.x), len(episode.xi), len(range(episode.xi.shape[1])[steps]))
+    config = model.config
+    expected = (config.controller_dim, config.observation_dim, config.time_steps)
+    if found != expected:
+        raise ValueError(
+            f"the model takes controllers, channels and steps of sizes {expected}, this episode has {found}: "
+            "name a model that was trained on this setup"
+        )
+    xi, bad = episode.xi[:, steps], degrees(episode.bad[steps])
+    return Telling(title, episode, renditions(model, episode.x, xi, bad, episode.y), stride)
+
+
+def strips(setup: Setup, shown: Telling, moments: Sequence[Moment], size: Size) -> Iterator[Picture]:
+    """For every moment the pictures of original, reconstruction and generation side by side."""
+    slow = replace(setup, control_step=setup.control_step * shown.stride)
+    last = shown.told[0].xi.shape[1] - 1
+    at = [moment.step for moment in moments]
+    # The model's sample s stands for the last step of stride s.
+    told_at = [min(max((step + 1) // shown.stride - 1, 0), last) for step in at]
+    columns = [
+        frames(setup, shown.episode.xi, at, size),
+        *(frames(slow, told.xi, told_at, size) for told in shown.told),
+    ]
+    for moment, original, *told in zip(moments, *columns, strict=True):
+        seconds = (moment.step + 1) * setup.control_step
+        note = badness_note(shown.episode.y)
+        panels = [captioned(original, f"original {seconds:.2f} s", note, moment.conditions)]
+        for picture, rendition in zip(told, shown.told, strict=True):
+            panels.append(captioned(picture, rendition.name, badness_note(rendition.y), ()))
+        yield mosaic(panels, len(panels))
+
+
+def board(titles: Sequence[str], blocks: Sequence[Sequence[Picture]]) -> UInt8[np.ndarray, "tall wide 3"]:
+    """Blocks of strips, each below its title and apart from the next, in rows of two."""
+    margin = ((0, 0), (0, GAP), (0, 0))
+    apart = [
+        np.pad(headed(mosaic(block, 1), title), margin, constant_values=255)
+        for title, block in zip(titles, blocks, strict=True)
+    ]
+    return mosaic(apart, ACROSS)
+
+
+def beside(
+    setup: Setup, episode: Episode, folder: Path, moments: Sequence[Moment], size: Size, kind: str
+) -> Iterator[Picture]:
+    """The pictures of an episode beside what the model of a folder makes of it.
+
+    Args:
+        setup: of the episode.
+        episode: the episode.
+        folder: of the model.
+        moments: to show.
+        size: of each of the three pictures of a moment.
+        kind: of the file they are for: stills stand below each other in one picture.
+
+    Raises:
+        UserError: there is no such model, or it is of another setup.
+    """
+    found = trained_model(folder, setup.name)
+    try:
+        shown = telling(summary(setup, episode), episode, found.model, found.metadata["stride"])
+    except ValueError as error:
+        raise UserError(f"cannot use the model: {error}") from error
+    rows = _counted(strips(setup, shown, moments, size), len(moments))
+    blocks = iter([list(rows)]) if kind in STILLS else ([row] for row in rows)
+    return (board([shown.title], [block]) for block in blocks)
+
+
+def _counted(rows: Iterator[Picture], count: int) -> Iterator[Picture]:
+    with ProgressLine("rows of pictures", count, 0) as progress:
+        for row in rows:
+            yield row
+            progress.advance(1, "")
+
+
+def remarkable_motions(
+    folder: Path, model: SvaeDc, dataset: Dataset, cache: TrainingCache, stride: int, count: int
+) -> list[Path]:
+    """A clip and stills of the best, the worst and two random held-out episodes, by objective.
+
+    Args:
+        folder: of the files.
+        model: in evaluation mode.
+        dataset: that the episodes are from.
+        cache: of it, at the stride.
+        stride: of the training.
+        count: moments of the clip.
+
+    Returns:
+        The files; none, and it is said why, where there is nothing to see.
+    """
+    try:
+        setup = setup_of(dataset.identity.setup, dataset.identity.bad_name)
+        scenery_of(setup)
+        return motions(folder, _remarkable(dataset, cache, model, stride), setup, count)
+    except (UsageError, LookupError, ValueError) as error:
+        say(f"no pictures of the model's motions: {error.args[0]}")
+        return []
+
+
+def _remarkable(dataset: Dataset, cache: TrainingCache, model: SvaeDc, stride: int) -> list[Telling]:
+    rows = cache.held_out()
+    chosen = remarkable(np.asarray(cache.f[rows]), np.random.default_rng(0))
+    indices = {name: int(cache.episode[rows[position]]) for name, position in chosen.items()}
+    tellings = []
+    for name, index in indices.items():
+        episode = dataset.episode(index)
+        title = f"{name} of {len(rows)} held-out episodes: {index}, objective {episode.f:+.2f}"
+        tellings.append(telling(title, episode, model, stride))
+    return tellings
+
+
+def motions(folder: Path, tellings: Sequence[Telling], setup: Setup, count: int) -> list[Path]:
+    """Write `motions.gif` and, of its moments, `motions.png`.
+
+    Args:
+        folder: of the files.
+        tellings: of episodes of the setup.
+        setup: that the episodes are of.
+        count: moments of the clip; the stills have the last of each third.
+
+    Raises:
+        LookupError: there is nothing to see.
+    """
+    titles = [each.title for each in tellings]
+    blocks: list[list[Picture]] = []
+    with ProgressLine("rows of pictures", count * len(tellings), 0) as progress:
+        for each in tellings:
+            blocks.append([])
+            # All begin alike, so the first step is left out.
+            for strip in strips(setup, each, stills(setup, each.episode, count + 1)[1:], SMALL):
+                blocks[-1].append(strip)
+                progress.advance(1, "")
+    chosen = sorted({math.ceil(count * part / DOWN) - 1 for part in range(1, DOWN + 1)})
+    still = board(titles, [[block[moment] for moment in chosen] for block in blocks])
+    clip = [board(titles, [[strip] for strip in together]) for together in zip(*blocks, strict=True)]
+    made = {folder / "motions.png": [still], folder / "motions.gif": clip}
+    for path, pictures in made.items():
+        with replacing(path) as unfinished:
+            write(unfinished, path.suffix, iter(pictures), RATE)
+    return list(made)
+
+
+def badness_note(y: float) -> str:
+    """What is written at the top right; nothing where the model knows nothing of badness."""
+    return "" if math.isnan(y) else f"bad {y:.0%}"

@@ -1,0 +1,1 @@
+"""Ray: a session, the machines of its cluster, pools of actors, and signals."""

@@ -1,0 +1,1 @@
+"""`svaedc train`: the model, fitted on Ray Train."""

@@ -1,0 +1,1 @@
+"""Bayesian optimisation on latent paths, and the methods it competes with."""

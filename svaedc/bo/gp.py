@@ -1,0 +1,192 @@
+"""What is expected of controllers that were not tried: a Gaussian process fitted to the history."""
+
+import logging
+import warnings
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import torch
+from botorch.exceptions.errors import ModelFittingError
+from botorch.exceptions.warnings import OptimizationWarning
+from botorch.fit import fit_gpytorch_mll
+from botorch.models import SingleTaskGP
+from botorch.models.map_saas import AdditiveMapSaasSingleTaskGP
+from botorch.models.transforms.outcome import Standardize
+from botorch.optim.fit import fit_gpytorch_mll_scipy
+from botorch.settings import validate_input_scaling
+from gpytorch.constraints import GreaterThan, Interval
+from gpytorch.kernels import Kernel, MaternKernel, ScaleKernel
+from gpytorch.likelihoods import GaussianLikelihood
+from gpytorch.means import ConstantMean
+from gpytorch.mlls import ExactMarginalLogLikelihood
+from jaxtyping import Float
+from linear_operator.utils.cholesky import psd_safe_cholesky
+from linear_operator.utils.errors import NanError, NotPSDError
+from torch import Tensor
+
+LEAST_NOISE = 1e-4
+"""Variance; the smallest with which no Cholesky factorisation failed in float64."""
+FIT_ITERATIONS = 25
+"""Of L-BFGS; with 22 trials in 48 dimensions the chosen controller no longer changes after 15."""
+_LEAST_VARIANCE = 1e-12
+_NOTHING, _ONE = torch.tensor(0.0), torch.tensor(1.0)
+
+_log = logging.getLogger(__name__)
+
+
+@runtime_checkable
+class Surrogate(Protocol):
+    """A belief about f."""
+
+    def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
+        ...
+
+
+Fit = Callable[[Tensor, Tensor], Surrogate]
+"""From the features [n, k] and objectives [n] of the trials to what is expected elsewhere."""
+
+
+class Process:
+    r"""A fitted process: \mu = m + k^T K^{-1} (f - m), \sigma^2 = k_0 - k^T K^{-1} k, K with its noise.
+
+    Each controller on its own, where BoTorch's posterior would predict them jointly, ten times slower.
+
+    Attributes:
+        model: Its mean, kernel, noise and trials.
+        event: Empty, or what went wrong while fitting and which hyper-parameters stand in.
+    """
+
+    def __init__(
+        self, model: SingleTaskGP, event: str = "", offset: Tensor = _NOTHING, factor: Tensor = _ONE
+    ) -> None:
+        """Conditions a model on its trials; the units of f are offset + factor times those of the model."""
+        self.model = model.eval().requires_grad_(requires_grad=False)
+        self.event = event
+        self._offset, self._unit = offset, factor
+        (self._trials,) = model.train_inputs
+        matrix = model.covar_module(self._trials).to_dense()
+        self._factor = psd_safe_cholesky(matrix + model.likelihood.noise * torch.eye(len(matrix)).to(matrix))
+        self._mean = model.mean_module.constant
+        residual = (model.train_targets - self._mean).unsqueeze(-1)
+        self._weights = torch.cholesky_solve(residual, self._factor)
+
+    def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
+        k = self.model.covar_module(phi, self._trials).to_dense()
+        k_0 = self.model.covar_module(phi, diag=True)
+        mu = self._mean + (k @ self._weights).squeeze(-1)
+        explained = torch.linalg.solve_triangular(self._factor, k.mT, upper=False).square().sum(dim=-2)
+        sigma = (k_0 - explained).clamp_min(_LEAST_VARIANCE).sqrt()
+        return self._offset + self._unit * mu, self._unit * sigma
+
+
+def scaled(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
+    """Objectives with the setup's limits at 0 and 1.
+
+    The limits are fixed per setup. Standardising by the few values of a run would make its first step depend
+    on the luck of two random trials.
+    """
+    low, high = limits
+    return (f - low) / (high - low)
+
+
+def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> Process:
+    """Hyper-parameters of maximum marginal likelihood, and the process with them conditioned on all trials.
+
+    Where a fit fails, the last good hyper-parameters serve: those fitted to the longest beginning of the
+    history for which it succeeds, so that the outcome depends on the history alone; with none, those the
+    kernel starts from.
+
+    Args:
+        kernel: Makes the kernel, with its starting hyper-parameters.
+        phi: Features of the trials, float64, of root-mean-square distance near 1.
+        f: Objectives, scaled to [0, 1].
+    """
+    process = _process(kernel(), phi, f)
+    event = ""
+    for count in range(len(f), 0, -1):
+        fitted = _process(kernel(), phi[:count], f[:count])
+        try:
+            _maximise_likelihood(fitted)
+        except (NanError, NotPSDError, ModelFittingError) as error:
+            event = event or f"hyper-parameters not fitted to {count} trials, earlier ones serve: {error}"
+            continue
+        process.load_state_dict(fitted.state_dict())
+        break
+    if event:
+        _log.warning(event)
+    return Process(process, event)
+
+
+def _process(kernel: Kernel, phi: Tensor, f: Tensor) -> SingleTaskGP:
+    mean = ConstantMean(constant_constraint=Interval(0.0, 1.0, initial_value=0.5))
+    likelihood = GaussianLikelihood(noise_constraint=GreaterThan(LEAST_NOISE, initial_value=1e-3))
+    # BoTorch warns that features are outside the unit cube and objectives not standardised: both are meant.
+    with validate_input_scaling(state=False):
+        return SingleTaskGP(
+            phi,
+            f[:, None],
+            likelihood=likelihood,
+            covar_module=kernel,
+            mean_module=mean,
+            outcome_transform=None,
+        )
+
+
+def _maximise_likelihood(model: SingleTaskGP) -> None:
+    likelihood = ExactMarginalLogLikelihood(model.likelihood, model).train()
+    with warnings.catch_warnings():
+        # Reaching FIT_ITERATIONS is no failure: the likelihood of a few trials is flat long before.
+        warnings.simplefilter("ignore", OptimizationWarning)
+        result = fit_gpytorch_mll_scipy(likelihood, options={"maxiter": FIT_ITERATIONS})
+    if result.fval is None or not np.isfinite(result.fval):
+        raise ModelFittingError(f"the marginal likelihood is {result.fval}")
+
+
+_log = logging.getLogger(__name__)
+
+
+def default(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+    """BoTorch's default process: SE with dimension-scaled priors (Hvarfner et al., ICML 2024)."""
+    return _fitted(SingleTaskGP, x, f)
+
+
+def saas(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+    """A sum of Matern kernels under sparsity priors (Eriksson and Jankowiak, UAI 2021).
+
+    BoTorch's maximum-a-posteriori form: its Markov chain Monte Carlo takes minutes for each trial.
+    """
+    return _fitted(AdditiveMapSaasSingleTaskGP, x, f)
+
+
+def turbo(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+    """The process of TuRBO's reference code: Matern-5/2 with bounded lengthscales and little noise."""
+    return _fitted(_matern_of_turbo, x, f)
+
+
+def _matern_of_turbo(x: Tensor, f: Tensor, outcome_transform: Standardize) -> SingleTaskGP:
+    lengthscale = Interval(0.005, 4.0)
+    kernel = MaternKernel(nu=2.5, ard_num_dims=x.shape[1], lengthscale_constraint=lengthscale)
+    return SingleTaskGP(
+        x,
+        f,
+        likelihood=GaussianLikelihood(noise_constraint=Interval(1e-8, 1e-3)),
+        covar_module=ScaleKernel(kernel),
+        outcome_transform=outcome_transform,
+    )
+
+
+def _fitted(build: Callable[..., SingleTaskGP], x: Tensor, f: Tensor) -> Process:
+    standardised = Standardize(m=1)
+    model, event = build(x, f[:, None], outcome_transform=standardised), ""
+    try:
+        with warnings.catch_warnings():
+            # Of a fit that found no better hyper-parameters, as for equal outcomes.
+            warnings.simplefilter("ignore", OptimizationWarning)
+            fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
+    except ModelFittingError as error:
+        event = f"hyper-parameters keep their starting values: {error}"
+        _log.warning(event)
+    return Process(model, event, standardised.means.squeeze(), standardised.stdvs.squeeze())

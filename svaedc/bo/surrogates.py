@@ -1,0 +1,146 @@
+"""What each method believes about f: the features it compares, by which kernel, in which units."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import torch
+from gpytorch.kernels import Kernel
+from torch import Tensor
+
+from svaedc.bo import gp, kernels
+from svaedc.bo.candidates import Candidates, Problem, as_they_are, by_density, by_latents, in_the_cube
+from svaedc.bo.distribution_features import Density
+from svaedc.bo.features import Sigmoid, Whitened, svae, svae_dc
+from svaedc.bo.gp import Fit, Surrogate, fit, scaled
+from svaedc.bo.history import History
+from svaedc.bo.online import AdjustedPaths
+
+LEAST_BAD: Final = 0.3
+"""Share of the pool that screening keeps."""
+_FOR_MEDIAN: Final = 100
+"""Simulated controllers whose distances say where alpha starts."""
+_AS_MEASURED: Final = (0.0, 1.0)
+
+KernelOf = Callable[[int], Kernel]
+"""A kernel with that many lengthscales."""
+
+
+@dataclass(frozen=True)
+class Belief:
+    """How a method learns from trials.
+
+    Attributes:
+        candidates: What may be suggested, with the features that are compared.
+        fit: Turns features and objectives of the trials into a surrogate.
+        limits: Objectives that count as 0 and 1.
+    """
+
+    candidates: Candidates
+    fit: Fit
+    limits: tuple[float, float]
+
+    def after(self, history: History) -> tuple[Surrogate, float]:
+        """The surrogate of a history that is not empty, and the largest objective in its units."""
+        f = scaled(torch.tensor(history.f), self.limits)
+        with torch.no_grad():
+            phi = self.candidates.features_of(torch.tensor(history.x))
+        return self.fit(phi, f), float(f.max())
+
+
+def on_controllers(kernel: KernelOf, problem: Problem) -> Belief:
+    """k_0 on x, with a lengthscale for every controller parameter."""
+    return _kernel_belief(as_they_are(problem), partial(kernel, problem.dimensions), problem)
+
+
+def on_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on \bar\tau, with a lengthscale for every latent dimension."""
+    return _on_latents(svae, kernel, problem)
+
+
+def on_compressed_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on (1 - \bar y) \bar\tau, equation (k_svae_dc)."""
+    problem.known_badness()
+    return _on_latents(svae_dc, kernel, problem)
+
+
+def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau."""
+    problem.known_badness()
+    return _on_latents(Sigmoid(), kernel, problem)
+
+
+def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on (1 - \bar y) \bar\tau / s."""
+    return _on_latents(Whitened.over(problem.known_badness().tau), kernel, problem)
+
+
+def on_screened_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on \bar\tau, among the controllers predicted least bad."""
+    return on_paths(kernel, problem.least_bad(LEAST_BAD))
+
+
+def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Belief:
+    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers."""
+    problem.known_badness()
+    start, adjustable = Sigmoid(), problem.known_adjustable()
+    trained = by_latents(problem, start)
+
+    def adjusted() -> Kernel:
+        return kernels.Embedded(kernel(trained.phi.shape[1]), AdjustedPaths(adjustable, trained.unit, start))
+
+    return _kernel_belief(in_the_cube(problem), adjusted, problem)
+
+
+def on_trajectories(problem: Problem) -> Belief:
+    """BBK-KL: the symmetrised KL between p(xi|x_i) and p(xi|x_j)."""
+    return _on_density(problem.known_densities().xi, problem)
+
+
+def on_latent_distributions(problem: Problem) -> Belief:
+    """LKL: the symmetrised KL between p(tau|x_i) and p(tau|x_j)."""
+    return _on_density(problem.known_densities().tau, problem)
+
+
+def packaged(fit: Fit, problem: Problem) -> Belief:
+    """A process of others on x, in the objective's own units, as they expect them."""
+    return Belief(in_the_cube(problem), fit, _AS_MEASURED)
+
+
+def _on_latents(embedding: Callable[[Tensor, Tensor], Tensor], kernel: KernelOf, problem: Problem) -> Belief:
+    candidates = by_latents(problem, embedding)
+    return _kernel_belief(candidates, partial(kernel, candidates.phi.shape[1]), problem)
+
+
+def _on_density(density: Density, problem: Problem) -> Belief:
+    candidates = by_density(problem, density)
+    some = candidates.phi[:_FOR_MEDIAN]
+    median = float(kernels.distance(density.divergence, some, some).median()) if len(some) else 1.0
+    return _kernel_belief(candidates, partial(kernels.kl, density.divergence, median or 1.0), problem)
+
+
+def _kernel_belief(candidates: Candidates, kernel: Callable[[], Kernel], problem: Problem) -> Belief:
+    return Belief(candidates, partial(fit, kernel), problem.objective_limits)
+
+
+BELIEFS: Final[dict[str, Callable[[Problem], Belief]]] = {
+    "se": partial(on_controllers, kernels.se),
+    "matern": partial(on_controllers, kernels.matern),
+    "botorch": partial(packaged, gp.default),
+    "saasbo": partial(packaged, gp.saas),
+    "turbo": partial(packaged, gp.turbo),
+}
+
+BELIEFS_OF_A_MODEL: Final[dict[str, Callable[[Problem], Belief]]] = {
+    "svae": partial(on_paths, kernels.se),
+    "svae-matern": partial(on_paths, kernels.matern),
+    "svae-dc": partial(on_compressed_paths, kernels.se),
+    "svae-dc-matern": partial(on_compressed_paths, kernels.matern),
+    "svae-dc-sigmoid": partial(on_sigmoid_paths, kernels.se),
+    "svae-dc-whitened": partial(on_whitened_paths, kernels.se),
+    "svae-dc-online": partial(on_adjusted_paths, kernels.se),
+    "screened-svae": partial(on_screened_paths, kernels.se),
+    "bbk-kl": on_trajectories,
+    "lkl": on_latent_distributions,
+}

@@ -1,0 +1,1 @@
+"""The SVAE-DC networks and the file they are kept in."""

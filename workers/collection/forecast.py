@@ -1,0 +1,121 @@
+"""What a collection will cost, from its first shards: expected numbers and their prediction intervals."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from workers.collection.shard import ShardReport
+
+LEVEL = 0.9
+"""Share of the intervals that are to hold the true number, if shards are alike."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An expected number; the true one lies within `margin` of it with probability `LEVEL`."""
+
+    value: float
+    margin: float
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a job costs as a whole, its pilot included.
+
+    Attributes:
+        episodes: of the job.
+        actors: that roll them out at the same time.
+        core_hours: CPU time of rollouts and storage, h.
+        hours: from the first rollout to the last, h.
+        size: bytes on disk.
+        badness: mean y.
+    """
+
+    episodes: int
+    actors: int
+    core_hours: Estimate
+    hours: Estimate
+    size: Estimate
+    badness: Estimate
+
+    def __post_init__(self) -> None:
+        """Refuse jobs of nobody or nothing."""
+        if self.episodes < 1 or self.actors < 1:
+            raise ValueError(f"a job needs episodes and actors, got {self.episodes} and {self.actors}")
+
+    def to_json(self) -> dict[str, object]:
+        """As plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, object]) -> "Forecast":
+        """The forecast that `to_json` turned into plain values.
+
+        Raises:
+            ValueError: they are not those of a forecast.
+        """
+        try:
+            plain = {
+                name: Estimate(**value) if isinstance(value, Mapping) else value
+                for name, value in values.items()
+            }
+            return cls(**plain)  # type: ignore[arg-type]
+        except TypeError as error:
+            raise ValueError(f"no forecast: {error}") from error
+
+
+def forecast(pilot: Sequence[ShardReport], episodes: int, actors: int) -> Forecast:
+    """What a job costs, of which some shards are done.
+
+    The other shards cost the mean of those, in proportion to their episodes; the interval is Student's for
+    the mean of m further shards, given n: t · s · √(1/n + 1/m).
+
+    Args:
+        pilot: the shards that are done, at least two.
+        episodes: of the whole job, with those of the pilot.
+        actors: that roll out at the same time.
+
+    Raises:
+        ValueError: the pilot is too short to know a spread, or longer than the job.
+    """
+    done = sum(report.shard.episodes for report in pilot)
+    if len(pilot) < 2 or episodes < done:
+        raise ValueError(
+            f"a forecast needs at least 2 shards of the job, got {len(pilot)} with {done} of its "
+            f"{episodes} episodes"
+        )
+
+    def total(costs: Sequence[float]) -> Estimate:
+        return _total(costs, [report.shard.episodes for report in pilot], episodes)
+
+    seconds = total([report.seconds for report in pilot])
+    core_seconds = total([report.rollout_seconds + report.storage_seconds for report in pilot])
+    bad = total([report.badness * report.shard.episodes for report in pilot])
+    return Forecast(
+        episodes=episodes,
+        actors=actors,
+        core_hours=_scaled(core_seconds, 1 / 3600),
+        hours=_scaled(seconds, 1 / 3600 / actors),
+        size=total([float(report.size) for report in pilot]),
+        badness=_scaled(bad, 1 / episodes),
+    )
+
+
+def _total(costs: Sequence[float], sizes: Sequence[int], episodes: int) -> Estimate:
+    """The cost of all episodes, from that of shards with these sizes; what is done is certain."""
+    spent, done = math.fsum(costs), sum(sizes)
+    left = episodes - done
+    if not left:
+        return Estimate(spent, 0.0)
+    count, others = len(costs), left / (done / len(costs))
+    each = np.array(costs) / np.array(sizes)
+    spread = float(each.std(ddof=1))
+    t = float(stdtrit(count - 1, (1 + LEVEL) / 2))
+    return Estimate(spent * episodes / done, left * t * spread * math.sqrt(1 / count + 1 / others))
+
+
+def _scaled(estimate: Estimate, factor: float) -> Estimate:
+    return Estimate(estimate.value * factor, estimate.margin * factor)

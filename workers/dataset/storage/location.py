@@ -1,0 +1,37 @@
+"""Where a dataset lies: in a folder of this machine's file systems, or below a prefix of an object store."""
+
+from pathlib import Path
+from typing import Any
+
+from workers.dataset.storage.s3_path import ObjectPath, object_path
+
+Location = Path | ObjectPath
+"""Both know `/`, `name`, `exists`, `iterdir`, `glob`, `read_bytes`, `read_text`, `unlink` and the like."""
+
+
+def location(text: str) -> Location:
+    """The place that a text names: `s3://bucket/prefix`, or a path.
+
+    Raises:
+        ValueError: it has a scheme, but is no address of an object store.
+    """
+    return object_path(text) if "://" in text else Path(text)
+
+
+def files(folder: Location, pattern: str) -> list[Location]:
+    """The files directly in a folder whose names fit a pattern, in their order; none without a folder."""
+    return sorted(folder.glob(pattern), key=_name)
+
+
+def _name(path: Location) -> str:
+    return path.name
+
+
+def fetched(path: Location) -> Location:
+    """The same path, to be read several times: an object's bytes are asked for once."""
+    return path if isinstance(path, Path) else path.fetched()
+
+
+def source(path: Location) -> Any:
+    """What PyArrow reads a file from, so that it need not fetch all of an object."""
+    return path if isinstance(path, Path) else path.open()

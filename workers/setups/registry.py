@@ -1,0 +1,71 @@
+"""Setups by name: those that ship, and modules of a user's own."""
+
+import hashlib
+import inspect
+from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+from workers.setups.setup import Setup, known
+
+SETUPS = {
+    "franka": "workers.setups.franka:franka",
+    "daisy-27d": "workers.setups.daisy:daisy_27d",
+    "daisy-11d": "workers.setups.daisy:daisy_11d",
+    "daisy-11d-rehearsal": "workers.setups.daisy:daisy_11d_rehearsal",
+    "quadratic-30d": "workers.setups.quadratic:quadratic_30d",
+    "quadratic-30d-intrinsic-3": "workers.setups.quadratic:quadratic_30d_intrinsic_3",
+    "franka-rehearsal": "workers.setups.franka:franka_rehearsal",
+    "yumi": "workers.setups.yumi:yumi",
+    "yumi-rehearsal": "workers.setups.yumi:yumi_rehearsal",
+}
+"""The setups that ship: the module and the function that makes each. A new robot is one module, and one line
+here for each of its variants; none for a module of the user's own, which offers `setup()`."""
+
+
+def load(name: str) -> Setup:
+    """The setup of that name, or of the importable module of that name, which offers `setup()`.
+
+    Raises:
+        LookupError: there is neither (it names the nearest), or the module is not as it must be.
+    """
+    if name in SETUPS or not _is_module(name):
+        module, _, function = SETUPS[_shipped(name)].partition(":")
+        return getattr(import_module(module), function)()
+    made = getattr(imported(name), "setup", lambda: None)()
+    if not isinstance(made, Setup):
+        raise LookupError(
+            f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
+        )
+    return replace(made, name=name, code=file_digest(imported(name)))
+
+
+def _shipped(name: str) -> str:
+    try:
+        return known(name, "setup", SETUPS)
+    except LookupError as error:
+        raise LookupError(f"{error.args[0]}; nor is there a module of that name to import") from error
+
+
+def imported(name: str) -> ModuleType:
+    """A user's module; one that cannot be imported raises `LookupError` with the reason."""
+    try:
+        return import_module(name)
+    except (ImportError, SyntaxError) as error:
+        raise LookupError(
+            f"cannot import the module {name!r}: {error}; it must be in the working directory or on "
+            "PYTHONPATH, on every machine of the cluster"
+        ) from error
+
+
+def file_digest(part: object) -> str:
+    """SHA-256 of the file that defines a module or function."""
+    return hashlib.sha256(Path(inspect.getfile(cast(Any, part))).read_bytes()).hexdigest()
+
+
+def _is_module(name: str) -> bool:
+    parts = name.split(".")
+    return all(part.isidentifier() for part in parts) and (len(parts) > 1 or find_spec(name) is not None)

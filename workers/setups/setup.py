@@ -1,0 +1,113 @@
+"""What a setup is: an environment, a controller and a task that belong together."""
+
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from workers.controllers.controller import Controller
+from workers.environments.environment import Channel, Environment
+from workers.physics import PhysicsRanges, ranges
+from workers.tasks.stop import STOPPED, StopRule, never
+from workers.tasks.task import BITS, Task
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A robot, its controller and its task.
+
+    Attributes:
+        name: as on the command line; of a user's module, the module's name.
+        build: makes the simulated environment.
+        controller: the parametric controller.
+        task: G_bad and the objective.
+        observation: the channels of ξ.
+        horizon: T, control steps of an episode.
+        control_step: seconds of each.
+        physics: ranges of data collection.
+        gaps: ranges of the hidden physics of a BO run, by the name of the gap level.
+        objective_limits: the objectives that BO sees as 0 and 1, fixed. No f is clipped to them: one outside
+            is seen below 0 or above 1. A diverged episode has the lower one.
+        success: an episode with f above this succeeded.
+        stop: ends an episode early; of stand-ins for hardware only.
+        code: SHA-256 of the file of a user's module; "" for the setups that ship.
+        broken: an episode with f below this broke something; NaN where f does not tell.
+    """
+
+    name: str
+    build: Callable[[], Environment]
+    controller: Controller
+    task: Task
+    observation: tuple[Channel, ...]
+    horizon: int
+    control_step: float
+    physics: PhysicsRanges
+    gaps: Mapping[str, PhysicsRanges]
+    objective_limits: tuple[float, float]
+    success: float
+    stop: StopRule = never
+    code: str = ""
+    broken: float = math.nan
+
+    def __post_init__(self) -> None:
+        """Refuse bad conditions that the bits of a step cannot hold, or that cannot be told apart."""
+        names, graded = self.task.conditions, self.task.graded
+        if graded and len(names) != 1:
+            raise ValueError(
+                f"{self.name} has a graded task, which must have one name in `conditions`, that of its "
+                f"degree, got {len(names)}: {', '.join(names)}; leave one"
+            )
+        if not 1 <= len(self.conditions) <= BITS:
+            raise ValueError(
+                f"{self.name} must have 1 to {BITS} bad conditions, {STOPPED!r} of a stop rule included, got "
+                f"{len(self.conditions)}: {', '.join(self.conditions)}; join some of them"
+            )
+        if len({*names}) != len(names) or (STOPPED in names and not graded):
+            raise ValueError(
+                f"the bad conditions of {self.name} must differ, and none be called {STOPPED!r}, got "
+                f"{', '.join(names)}; rename one"
+            )
+
+    @property
+    def dimensions(self) -> int:
+        """D, the length of x."""
+        return self.controller.dimensions
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the bad conditions, in the order of their bits; `stopped` comes last if it may be.
+
+        A graded G_bad has no bits: a stop gives its steps the degree 1.
+        """
+        bits = self.stop is not never and not self.task.graded
+        return (*self.task.conditions, STOPPED) if bits else self.task.conditions
+
+    def open(self) -> Environment:
+        """Start the simulated environment; close it, or use it in a `with` block."""
+        return self.build()
+
+    def gap(self, level: str) -> PhysicsRanges:
+        """Ranges of a sim-to-real gap level, or those written out, such as `friction=1:2.5,restitution=0.05`.
+
+        Parameters that are not written out keep the middle of their range of data collection.
+
+        Raises:
+            LookupError: when there is no such level or no such parameter; the message names the nearest.
+            ValueError: when a range is not written as `workers.physics.ranges` reads it, or is impossible.
+        """
+        if "=" not in level:
+            return self.gaps[known(level, "gap level", self.gaps)]
+        fixed = {name: (value, value) for name, value in self.physics.middle().items()}
+        written = ranges(level).intervals
+        for name in written:
+            known(name, "physics parameter", fixed)
+        return PhysicsRanges({**fixed, **written})
+
+
+def known(name: str, kind: str, names: Mapping[str, object]) -> str:
+    """The name itself if it is one of the names; otherwise a `LookupError` that suggests the nearest."""
+    if name in names:
+        return name
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    raise LookupError(f"unknown {kind} {name!r}; {hint}known: {', '.join(names)}")
