@@ -19,7 +19,7 @@ from typing import Any
 import torch
 
 from cluster.comparison.records import RunKey
-from cluster.comparison.tune import Standing, Watch, submit
+from cluster.comparison.tune import BestSoFar, Watch, submit
 from cluster.comparison.worker import ComparisonJob
 from cluster.config import RaySettings
 from cluster.progress import ProgressLine
@@ -73,7 +73,7 @@ def on_tune(job: ComparisonJob, keys: list[RunKey], slots: int) -> Rates:
     """As `svaedc compare` does it."""
     with connect(RaySettings(num_cpus=slots), address=None, parts=()):
         progress = ProgressLine("trials", len(keys) * job.length, 0)
-        clock = Clock(progress, Standing((METHOD,)), lambda _: None)
+        clock = Clock(progress, BestSoFar((METHOD,)), lambda _: None)
         begin = time.monotonic()
         submit(job, keys, slots, clock)
         return Rates.of(begin, clock.reports, slots)

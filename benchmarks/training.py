@@ -26,9 +26,9 @@ from cluster.config import CollectSettings, RaySettings, TrackingSettings
 from cluster.datasets.collect import collect
 from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
-from cluster.training.worker import TrainingJob, episodes, trained
+from cluster.training.worker import TrainingJob, episodes, train_together
 from svaedc.data.episodes import Batch, Episodes, split
-from svaedc.model.svae_dc import initialised
+from svaedc.model.svae_dc import initialized_model
 from svaedc.training.loop import fit
 from svaedc.training.objectives import Objective
 from svaedc.training.presets import Sizes, compact, paper
@@ -74,7 +74,7 @@ def head(name, stride, updates, batch_size):
 
 def ours(halves, preset):
     """CPU seconds per update of our loop, its measures included."""
-    model = initialised(preset[0], halves[0], BOUNDS, seed=0)
+    model = initialized_model(preset[0], halves[0], BOUNDS, seed=0)
     begin = time.process_time()
     reports = list(fit(model, *halves, preset[1]))
     return (time.process_time() - begin) / reports[-1].update
@@ -82,7 +82,7 @@ def ours(halves, preset):
 
 def plain(halves, preset):
     """CPU seconds per update of the leanest loop around the same model: no measures, states or reports."""
-    model = initialised(preset[0], halves[0], BOUNDS, seed=0)
+    model = initialized_model(preset[0], halves[0], BOUNDS, seed=0)
     settings, training = preset[1], halves[0]
     columns = [
         torch.from_numpy(np.asarray(array)[training.rows])
@@ -125,7 +125,7 @@ def worker(config):
     job = config["job"]
     cache = job.data()
     clock = Clock()
-    trained(job, clock)
+    train_together(job, clock)
     joint = [seconds for stage, seconds in clock.marks if stage == "joint"]
     seconds = {
         "ours": (joint[-1] - joint[0]) / (job.updates - UPDATES),

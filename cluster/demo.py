@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cluster.comparison.compare import Comparison, compare
-from cluster.comparison.plan import Grid, planned
+from cluster.comparison.plan import Grid, plan_comparison
 from cluster.config import Settings
 from cluster.datasets.collect import collect
-from cluster.progress import say, timed
+from cluster.progress import say, timing
 from cluster.runtime.placement import free_machines
 from cluster.runtime.session import Session
 from cluster.tracking import Tracker
-from cluster.training.launch import placed
+from cluster.training.launch import placement_of
 from cluster.training.train import MINIMUM_EPISODES, train
 from svaedc.analysis.summary import Difference
 from workers import setups
@@ -66,7 +66,7 @@ def demo(
         f"{size.runs} runs of {size.trials} trials instead of 50 of 20. It shows the machine at work, "
         "and proves nothing about the methods."
     )
-    with timed("1/3 collect"):
+    with timing("1/3 collect"):
         collect(
             setup=setups.load(SETUP),
             episodes=size.episodes,
@@ -76,9 +76,9 @@ def demo(
             session=session,
             tracker=tracker,
         )
-    with timed("2/3 train"):
+    with timing("2/3 train"):
         _train(folder, settings, session, tracker, size)
-    with timed("3/3 compare"):
+    with timing("3/3 compare"):
         comparison = _compare(folder, settings, session, tracker, size)
     say(conclusion(folder, comparison, f"svaedc ui --set tracking.uri={tracker.uri}"))
     return comparison
@@ -103,7 +103,7 @@ def _train(folder: Path, settings: Settings, session: Session, tracker: Tracker,
 def _compare(
     folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize
 ) -> Comparison:
-    plan = planned(
+    plan = plan_comparison(
         setup=setups.load(SETUP),
         grid=Grid(size.methods, seed=0, runs=size.runs),
         trials=size.trials,
@@ -119,7 +119,7 @@ def _preflight(settings: Settings, size: DemoSize, session: Session) -> None:
     """Refuse now what a later stage would refuse after minutes of work."""
     shards = math.ceil(size.episodes / settings.collect.episodes_per_shard)
     session.preflight(min(settings.collect.actor_count(session.cpus), shards))
-    placed(settings.train, free_machines(session))
+    placement_of(settings.train, free_machines(session))
     session.preflight(settings.compare.slots)
 
 

@@ -27,7 +27,7 @@ def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
     Raises:
         UserError: it cannot be read, or was trained on another setup.
     """
-    file = checkpoint.located(path)
+    file = checkpoint.checkpoint_path(path)
     try:
         model, metadata = checkpoint.load(file)
         trained_on = twin if twin and metadata.get("setup") == twin else setup

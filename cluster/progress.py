@@ -54,9 +54,11 @@ class ProgressLine:
             self._bar.update(self._task, advance=count, note=f"{self.rate:.1f}/s  {note}")
         elif time.monotonic() - self._logged > _LOG_SECONDS:
             self._logged = time.monotonic()
-            say(f"{self.done}/{self._total} {self._what}, {self.rate:.1f}/s, {self._left()} left, {note}")
+            say(
+                f"{self.done}/{self._total} {self._what}, {self.rate:.1f}/s, {self._time_left()} left, {note}"
+            )
 
-    def _left(self) -> str:
+    def _time_left(self) -> str:
         if self.done == self._before:
             return "unknown time"
         return duration((self._total - self.done) / self.rate)
@@ -75,7 +77,7 @@ def _bar(what: str) -> Progress:
 
 
 @contextmanager
-def timed(what: str) -> Iterator[None]:
+def timing(what: str) -> Iterator[None]:
     """Say what begins, and how long it took."""
     begin = time.monotonic()
     say(f"{what} ...")

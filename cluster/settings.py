@@ -82,12 +82,12 @@ def _complaints(error: ValidationError) -> Iterator[str]:
             continue
         seen.add(name)
         if detail["type"] == "extra_forbidden":
-            yield f"unknown setting {name!r}, {nearest(name, _known(place))}"
+            yield f"unknown setting {name!r}, {nearest(name, _known_names(place))}"
         else:
             yield f"{name}: {detail['msg'][0].lower()}{detail['msg'][1:]}, got {detail['input']!r}"
 
 
-def _known(place: Sequence[str]) -> list[str]:
+def _known_names(place: Sequence[str]) -> list[str]:
     """The full names that could have stood where this unknown one stands."""
     sections = get_type_hints(Settings)
     names = [

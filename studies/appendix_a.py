@@ -98,7 +98,7 @@ def compute(source: Source, cell: Cell) -> Result:
     return {"first": first, "last": measures(model, held_out), "seconds": seconds}
 
 
-def summarised(name: str, found: Sequence[Result]) -> list[str]:
+def summarized(name: str, found: Sequence[Result]) -> list[str]:
     """One row: the share that collapsed, and mean and standard deviation over all seeds."""
     collapsed = sum(bool(result["collapsed"]) for result in found)
     cells = [f"{mean(values):.3f} ± {stdev(values):.3f}" for values in _columns(found)]
@@ -129,7 +129,7 @@ def main() -> None:
     )
     found = dict(zip(cells, computed, strict=True))
     rows = [
-        summarised(label, [found[arm, seed][stage] for seed in range(given.seeds)])
+        summarized(label, [found[arm, seed][stage] for seed in range(given.seeds)])
         for label, (arm, stage) in ROWS.items()
     ]
     note = (

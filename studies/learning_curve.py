@@ -72,9 +72,9 @@ def draw(path: Path, cells: Sequence[Cell], found: Sequence[Result]) -> None:
         "best of 2 + 10 trials among held-out": ("svae-dc best", "screened-random best"),
     }
     for axes, (title, names) in zip(figure.subplots(1, 3), panels.items(), strict=True):
-        for name, colour in zip(names, ("#d55e00", "#0072b2"), strict=True):
+        for name, color in zip(names, ("#d55e00", "#0072b2"), strict=True):
             values = [result[name] for result in found]
-            axes.plot([cell.count for cell in cells], values, "o-", color=colour, label=COLUMNS[name])
+            axes.plot([cell.count for cell in cells], values, "o-", color=color, label=COLUMNS[name])
         axes.set_xscale("log", base=2)
         labels = [f"{cell.count / 1e3:.3g}k" for cell in cells]
         axes.set_xticks([cell.count for cell in cells], labels, rotation=45)

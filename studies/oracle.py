@@ -27,7 +27,7 @@ from svaedc.bo.candidates import Problem, as_they_are
 from svaedc.bo.features import LatentMeans, Latents
 from svaedc.bo.loop import trials
 from svaedc.bo.offline import INITIAL, Recorded
-from svaedc.data.episodes import Batch, Episodes, measured_over
+from svaedc.data.episodes import Batch, Episodes, measure_batches
 from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
 from workers import setups
@@ -101,7 +101,7 @@ def codes(model: SvaeDc, chosen: Episodes, share: float) -> dict[str, Tensor]:
             "median": (model.normaliser.median - scaled).abs().mean(-1),
         }
 
-    return measured_over(chosen, torch.device("cpu"), measure)
+    return measure_batches(chosen, torch.device("cpu"), measure)
 
 
 def looked_up(
@@ -147,9 +147,9 @@ def draw(path: Path, found: Mapping[tuple[str, float], Result]) -> None:
     errors = [found[METHODS[0], share]["error"] for share in SHARES]
     for axes, after in zip(figure.subplots(1, len(AFTER), sharey=True), AFTER, strict=True):
         for method in METHODS:
-            colour, marker, line = STYLES[method]
+            color, marker, line = STYLES[method]
             means = [np.mean(found[method, share][f"best {after}"]) for share in SHARES]
-            axes.plot(errors, means, color=colour, marker=marker, linestyle=line, label=method)
+            axes.plot(errors, means, color=color, marker=marker, linestyle=line, label=method)
         axes.axhline(np.mean(found[RANDOM, 0.0][f"best {after}"]), color="#8c8c8c", ls=":", label=RANDOM)
         axes.invert_xaxis()
         axes.set_title(f"mean best objective after {after} trials", loc="left", fontsize=10)
@@ -181,7 +181,7 @@ def main() -> None:
     given = parser.parse_args()
     source = Source(given.dataset, given.cache)
     dataset, _ = source.opened()
-    path = checkpoint.located(given.model)
+    path = checkpoint.checkpoint_path(given.model)
     what = (sha256(path), dataset.fingerprint(), given.candidates, given.runs)
     kinds = [(RANDOM, 0.0), *((method, share) for share in SHARES for method in METHODS)]
     cells = [Cell(*what, *kind) for kind in kinds]

@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from cluster.comparison.records import RunKey, recorded, rows
+from cluster.comparison.records import RunKey, read_trials, rows
 from cluster.comparison.worker import ComparisonJob
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.seeds import FIRST_TUNING
 from svaedc.analysis.summary import Reporting
 from svaedc.data.episodes import Episodes
@@ -130,8 +130,8 @@ def gains(cell: Cell, setup_name: str, model: Path, out: Path) -> dict[str, floa
                 key = RunKey(method, seed)
                 for _ in job.run(key, setup, environment):
                     pass
-                kept.append((key, recorded(key.path(folder))))
-    summary = summarise(rows(kept), Reporting(INITIAL), np.random.default_rng(0))
+                kept.append((key, read_trials(key.path(folder))))
+    summary = summarize(rows(kept), Reporting(INITIAL), np.random.default_rng(0))
     [gain] = [each for each in summary.differences if each.method == "svae-dc"]
     return {f"{part} {n}": getattr(gain.best[INITIAL + n - 1], part) for n in AFTER for part in PARTS}
 

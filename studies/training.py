@@ -13,10 +13,10 @@ from cluster.training.worker import episodes
 from svaedc.bo.offline import Recorded, worth
 from svaedc.data.episodes import Episodes
 from svaedc.model.diagnostics import collapse, evaluate
-from svaedc.model.svae_dc import SvaeDc, initialised
+from svaedc.model.svae_dc import SvaeDc, initialized_model
 from svaedc.training.config import TrainingSettings
 from svaedc.training.loop import fit
-from svaedc.training.presets import Preset, Sizes, preset, varied
+from svaedc.training.presets import Preset, Sizes, preset, vary
 from workers import setups
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import Dataset, open_dataset
@@ -57,7 +57,7 @@ def halves(cache: TrainingCache, count: int) -> tuple[Episodes, Episodes]:
 def preset_for(cache: TrainingCache, name: str, changes: Mapping[str, Any], seed: int) -> Preset:
     """A preset with some of its choices changed, for the sizes of a cache."""
     sizes = Sizes(cache.x.shape[1], *cache.xi.shape[1:])
-    made = varied(preset(name)(sizes), changes)
+    made = vary(preset(name)(sizes), changes)
     return made._replace(training=replace(made.training, seed=seed))
 
 
@@ -65,7 +65,7 @@ def begun(made: Preset, training: Episodes, dataset: Dataset) -> SvaeDc:
     """The model before its first update; one thread from here on."""
     torch.set_num_threads(1)
     low, high = ([channel[index] for channel in dataset.identity.observation] for index in (2, 3))
-    return initialised(made.model, training, (low, high), made.training.seed)
+    return initialized_model(made.model, training, (low, high), made.training.seed)
 
 
 def train(model: SvaeDc, training: Episodes, held_out: Episodes, settings: TrainingSettings) -> float:

@@ -57,13 +57,13 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         record = self._environment.step(command)
         observed = self._environment.observed([record])
         if not sane_steps(observed.xi, self._setup.observation):
-            return self._last, diverged_objective(self._setup), True, False, _ended(DIVERGED)
+            return self._last, diverged_objective(self._setup), True, False, _end_info(DIVERGED)
         self._records.append(record)
         self._last = self._row(observed)
         reason = self._setup.stop(observed)
         if reason:
             reward = self._objective(self._setup.task.stopped_objective)
-            return self._last, reward, True, False, _ended(reason)
+            return self._last, reward, True, False, _end_info(reason)
         truncated = len(self._records) >= self._setup.horizon
         reward = self._objective(self._setup.task.objective) if truncated else 0.0
         return self._last, reward, False, truncated, {"bad": self._bad(observed)}
@@ -83,7 +83,7 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         return of(whole, self._setup.task.is_bad(whole))
 
 
-def _ended(reason: str) -> dict[str, Any]:
+def _end_info(reason: str) -> dict[str, Any]:
     """The `info` of a step that ended an episode before its horizon."""
     return {"bad": True, "stop": reason}
 

@@ -24,7 +24,7 @@ from workers.environments.environment import Channel
 from workers.setups import Setup
 from workers.simulation import shapes
 from workers.simulation.scenery import POSE_CHANNELS, Machine, Roll, Scenery, Vector
-from workers.simulation.stage import Stage
+from workers.simulation.stage import Scene
 
 REACH = 32  # tiles of the ground drawn around every point the camera looks at
 CALM = 1.0  # s, over which a camera that follows takes the mean of the positions
@@ -74,7 +74,7 @@ def frames(
             f"got shape {xi.shape} with {np.count_nonzero(~np.isfinite(xi))} that are not finite"
         )
     scenery = scenery_of(setup)
-    with Stage() as stage:
+    with Scene() as stage:
         show = Show(stage, scenery, setup.observation)
         targets = show.targets(xi, setup.control_step)
         show.lay_ground(targets)
@@ -95,7 +95,7 @@ def scenery_of(setup: Setup) -> Scenery:
 class Show:
     """The bodies of a scenery on a stage, moved by columns of ξ."""
 
-    def __init__(self, stage: Stage, scenery: Scenery, channels: Sequence[Channel]) -> None:
+    def __init__(self, stage: Scene, scenery: Scenery, channels: Sequence[Channel]) -> None:
         self._stage = stage
         self._scenery = scenery
         self._rows = {channel.name: row for row, channel in enumerate(channels)}
@@ -135,7 +135,7 @@ class Show:
         targets = np.repeat(np.array(camera.target)[:, None], xi.shape[1], axis=1)
         if camera.follows:
             position = xi[self._pose_rows(camera.follows)[:2]].astype(np.float64)
-            targets[:2] += _smoothed(position, round(CALM / control_step))
+            targets[:2] += _smooth(position, round(CALM / control_step))
         return targets
 
     def lay_ground(self, targets: Float[np.ndarray, "3 time"]) -> None:
@@ -166,7 +166,7 @@ def _direction(vector: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
     return vector / length if length > _SMALL else otherwise
 
 
-def _smoothed(rows: Float[np.ndarray, "n time"], width: int) -> Float[np.ndarray, "n time"]:
+def _smooth(rows: Float[np.ndarray, "n time"], width: int) -> Float[np.ndarray, "n time"]:
     """Means over `width` steps around each, the ends repeated."""
     padded = np.pad(rows, ((0, 0), (width // 2, width - 1 - width // 2)), mode="edge")
     sums = np.cumsum(np.pad(padded, ((0, 0), (1, 0))), axis=1)

@@ -22,7 +22,7 @@ from workers.physics import Physics
 from workers.randomness import generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
-from workers.tasks.task import Bad, marked, require_objective
+from workers.tasks.task import Bad, check_bad, require_objective
 
 VERSION = 1
 """Part of a dataset's identity: raise it whenever an episode's bytes change."""
@@ -80,7 +80,7 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
         step = environment.step
         records, reason = [step(command(t)) for t in range(setup.horizon)], ""
     else:
-        records, reason = _guarded(setup, environment, command)
+        records, reason = _run_until_stop(setup, environment, command)
     return _episode(setup, environment.observed(records), reason, controller, physics)
 
 
@@ -106,7 +106,7 @@ def random_episode(
     return episode
 
 
-def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
+def _run_until_stop(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
     """The records up to the step at which the setup's rule stops, that one included, and its reason."""
     records = []
     for t in range(setup.horizon):
@@ -120,14 +120,14 @@ def _guarded(setup: Setup, environment: Environment, command: Command) -> tuple[
 def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:
     sane, steps = sane_steps(observed.xi, setup.observation), observed.xi.shape[1]
     if sane < steps:
-        return _diverged(setup, observed.xi[:, :sane], x, physics)
+        return _diverged_episode(setup, observed.xi[:, :sane], x, physics)
     is_bad = setup.task.is_bad(observed)
     objective = setup.task.stopped_objective if reason else setup.task.objective
-    stored = _stored(marked(setup.task, is_bad, steps))
-    bad = _stopped(stored, setup) if reason else stored
+    stored = _encode_bad(check_bad(setup.task, is_bad, steps))
+    bad = _mark_stopped(stored, setup) if reason else stored
     return Episode(
         x=x,
-        xi=_held(observed.xi, setup.horizon),
+        xi=_hold_last(observed.xi, setup.horizon),
         bad=bad,
         y=float(degrees(bad).mean(dtype=np.float64)),
         f=float(np.float32(objective(observed, is_bad))),
@@ -136,7 +136,7 @@ def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physi
     )
 
 
-def _stopped(bad: UInt8[np.ndarray, " run"] | Float32[np.ndarray, " run"], setup: Setup) -> Stored:
+def _mark_stopped(bad: UInt8[np.ndarray, " run"] | Float32[np.ndarray, " run"], setup: Setup) -> Stored:
     """All T steps: `stopped` from the last that was run, and nothing else where none was; degrees of 1."""
     whole = np.zeros(setup.horizon, dtype=bad.dtype)
     whole[: len(bad)] = bad
@@ -147,20 +147,22 @@ def _stopped(bad: UInt8[np.ndarray, " run"] | Float32[np.ndarray, " run"], setup
     return whole
 
 
-def _held(xi: Float32[np.ndarray, "obs run"], horizon: int) -> Float32[np.ndarray, "obs time"]:
+def _hold_last(xi: Float32[np.ndarray, "obs run"], horizon: int) -> Float32[np.ndarray, "obs time"]:
     """The trajectory with its last state repeated up to the horizon."""
     missing = horizon - xi.shape[1]
     return np.pad(xi, ((0, 0), (0, missing)), mode="edge") if missing else xi
 
 
-def _diverged(
+def _diverged_episode(
     setup: Setup, sane: Float32[np.ndarray, "obs sane"], x: np.ndarray, physics: Physics
 ) -> Episode:
     """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
     if not sane.size:
         sane = np.array([[(channel.low + channel.high) / 2] for channel in setup.observation], np.float32)
-    bad = _stored(np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool))
-    return Episode(x, _held(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
+    bad = _encode_bad(
+        np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool)
+    )
+    return Episode(x, _hold_last(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
 
 
 def diverged_objective(setup: Setup) -> float:
@@ -184,11 +186,11 @@ def degrees(
     return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
 
 
-def sampled(horizon: int, stride: int) -> slice:
+def stride_steps(horizon: int, stride: int) -> slice:
     """The steps that a model sees of an episode: the last one of every whole stride."""
     return slice(stride - 1, horizon // stride * stride, stride)
 
 
-def _stored(is_bad: Bad) -> Stored:
+def _encode_bad(is_bad: Bad) -> Stored:
     """Degrees as they are; otherwise one bit per condition, the first condition lowest."""
     return is_bad[0] if is_bad.dtype == np.float32 else np.packbits(is_bad, axis=0, bitorder="little")[0]

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.table import Table
 
 from cluster.datasets.export import export
-from cluster.datasets.quarantine import quarantined
-from cluster.datasets.repair import recomputed, repair_dataset
+from cluster.datasets.quarantine import quarantined_shards
+from cluster.datasets.repair import recompute_shards, repair_dataset
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
 from cluster.progress import ProgressLine
@@ -20,7 +20,7 @@ from workers.dataset.inventory import inventory
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 from workers.dataset.storage.location import Location
-from workers.dataset.verification import Problem, gaps, overlaps, verify
+from workers.dataset.verification import Defect, gaps, overlaps, verify
 
 app = typer.Typer(no_args_is_help=True, help="Look into a dataset, prove that it is whole, or repair it.")
 
@@ -32,7 +32,7 @@ Folder = Annotated[
 ]
 
 
-def _opened(folder: Location) -> Dataset:
+def _open(folder: Location) -> Dataset:
     try:
         return open_dataset(folder)
     except ValueError as error:
@@ -42,7 +42,7 @@ def _opened(folder: Location) -> Dataset:
 @app.command()
 def info(folder: Folder) -> None:
     """What a dataset is and what its episodes are like."""
-    dataset = _opened(folder)
+    dataset = _open(folder)
     identity = dataset.identity
     table = Table(show_header=False, box=None)
     episodes, kilobytes = dataset.episodes(), dataset.size() / 1e3
@@ -59,10 +59,10 @@ def info(folder: Folder) -> None:
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
         "made with": f"pybullet {identity.pybullet}, numpy {identity.numpy}",
-        "put aside": ", ".join(shard.name for shard in quarantined(dataset)) or "none",
+        "put aside": ", ".join(shard.name for shard in quarantined_shards(dataset)) or "none",
     }
     try:
-        rows |= _described(statistics(dataset)) if episodes else {}
+        rows |= _table_rows(statistics(dataset)) if episodes else {}
         rows |= _irreducible(dataset) if identity.repeats > 1 else {}
     except ValueError as error:
         raise UserError(
@@ -73,7 +73,7 @@ def info(folder: Folder) -> None:
     Console().print(table)
 
 
-def _described(found: Statistics) -> dict[str, str]:
+def _table_rows(found: Statistics) -> dict[str, str]:
     return {
         "objective": "  ".join(f"{value:+.2f}" for value in found.objective)
         + "  (min, 5, 25, 50, 75, 95 %, max)",
@@ -109,11 +109,11 @@ def verify_command(
     ] = 0,
 ) -> None:
     """Check every byte and row; exits with 1, names each broken file and each gap. Changes nothing."""
-    dataset = _opened(folder)
+    dataset = _open(folder)
     found = [*inventory(dataset), *_problems_in_files(dataset)]
     if rederive:
         with interruptible("nothing was changed"), terminating_as_exit():
-            found += recomputed(dataset, rederive)
+            found += recompute_shards(dataset, rederive)
     uncollected = list(gaps(dataset))
     for problem in found:
         typer.echo(f"{problem.file}: {problem.what}")
@@ -132,8 +132,8 @@ def verify_command(
     typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")
 
 
-def _problems_in_files(dataset: Dataset) -> list[Problem]:
-    found: list[Problem] = []
+def _problems_in_files(dataset: Dataset) -> list[Defect]:
+    found: list[Defect] = []
     with ProgressLine("episodes", dataset.episodes(), 0) as progress:
         for shard, problems in verify(dataset):
             found += problems
@@ -144,7 +144,7 @@ def _problems_in_files(dataset: Dataset) -> list[Problem]:
 @app.command(name="repair")
 def repair_command(folder: Folder) -> None:
     """Roll out broken and lost shards again and put them in place; keeps what it replaces."""
-    dataset = _opened(folder)
+    dataset = _open(folder)
     with interruptible(), terminating_as_exit():
         repair_dataset(dataset)
     left = [*inventory(dataset), *overlaps(dataset)]
@@ -164,7 +164,7 @@ def export_command(
     out: Annotated[Path, typer.Option("--out", help="A new folder.", callback=durable)],
 ) -> None:
     """Write the episodes in another format, one shard in memory at a time."""
-    dataset = _opened(folder)
+    dataset = _open(folder)
     with interruptible("nothing of it is kept, and the same command begins anew"), terminating_as_exit():
         export(dataset, form, out)
     typer.echo(f"{out} holds {dataset.episodes()} episodes")

@@ -54,12 +54,12 @@ def start(
 ) -> None:
     """Carry a campaign out, or go on with it: 2 random trials, then suggested ones."""
     from cluster.hardware.driver import start as run_start
-    from cluster.hardware.plan import Plan, identify
-    from svaedc.model.checkpoint import located
+    from cluster.hardware.plan import CampaignPlan, identify
+    from svaedc.model.checkpoint import checkpoint_path
 
     settings = settings_of(config, overrides)
-    checkpoint = located(model) if model else None
-    plan = Plan(
+    checkpoint = checkpoint_path(model) if model else None
+    plan = CampaignPlan(
         identify(robot, method, trials, seed, _pool(settings.hardware), checkpoint, approval),
         folder,
         checkpoint,

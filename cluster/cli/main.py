@@ -163,11 +163,11 @@ def compare(
     --seed 1000 and above. Writes trials.parquet, summary.json, report.html, figure.png and figure.svg.
     """
     from cluster.comparison.compare import compare as run_comparison
-    from cluster.comparison.plan import Grid, planned
+    from cluster.comparison.plan import Grid, plan_comparison
 
     settings = settings_of(config, overrides)
     names = tuple(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-    plan = planned(
+    plan = plan_comparison(
         setup=setup_of(setup),
         grid=Grid(names, seed, runs),
         trials=trials,

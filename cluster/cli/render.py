@@ -45,7 +45,7 @@ def render(
     `svaedc render --setup franka --x dataset:data/franka:12 --model models/franka --out told.gif`
     """
     from cluster.files import replacing
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
     from cluster.rendering.frames import clip, drawable, pictures, summary, usual_speed
     from cluster.rendering.frames import stills as chosen_stills
     from cluster.rendering.model_frames import beside
@@ -54,7 +54,7 @@ def render(
     robot = setup_of(setup)
     size = drawable(robot, out, width, height)
     pace = usual_speed(robot) if speed is None else speed
-    episode = exhibit(x, robot, seed)
+    episode = episode_to_draw(x, robot, seed)
     if out.suffix in STILLS:
         moments, note = chosen_stills(robot, episode, stills), robot.name
     else:

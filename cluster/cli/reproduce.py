@@ -64,14 +64,14 @@ def reproduce(
     """
     from cluster.reproduction import figures
     from cluster.reproduction import plan as scales
-    from cluster.reproduction.plan import resolved
+    from cluster.reproduction.plan import resolve
     from cluster.reproduction.run import reproduce as run_reproduction
 
     settings = settings_of(config, overrides)
     _require_consistent(settings, dataset, episodes)
     with usage_errors():
         recipe, size = figures.recipe(figure), scales.scale(scale)
-    reproduction = resolved(
+    reproduction = resolve(
         recipe,
         size,
         folder,

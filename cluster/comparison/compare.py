@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from cluster.comparison.folder import alone_in, claim
-from cluster.comparison.plan import Plan, described
-from cluster.comparison.records import TABLE, RunKey, all_runs, recorded, seeds_in
+from cluster.comparison.plan import ComparisonPlan, run_parameters
+from cluster.comparison.records import TABLE, RunKey, all_runs, read_trials, seeds_in
 from cluster.comparison.report import FIGURE, PAGE, SUMMARY, lines, publish, summary_of
 from cluster.comparison.tracking import Note, TrackedComparison, begin, note_in
-from cluster.comparison.tune import Standing, Watch, submit
+from cluster.comparison.tune import BestSoFar, Watch, submit
 from cluster.progress import ProgressLine, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
@@ -30,8 +30,8 @@ class Comparison:
     url: str
 
 
-def compare(plan: Plan, session: Session, tracker: Tracker) -> Comparison:
-    """Run what is missing of a comparison, then summarise all of it.
+def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Comparison:
+    """Run what is missing of a comparison, then summarize all of it.
 
     Args:
         plan: what it compares.
@@ -60,33 +60,33 @@ def compare(plan: Plan, session: Session, tracker: Tracker) -> Comparison:
             return Comparison(_record(plan, tracked, parameters), tracked.run.url)
 
 
-def _is_finished(plan: Plan, note: Note, runs: Mapping[RunKey, Sequence[Trial]]) -> bool:
+def _is_finished(plan: ComparisonPlan, note: Note, runs: Mapping[RunKey, Sequence[Trial]]) -> bool:
     """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
     whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
     return whole and all((plan.job.folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
 
 
-def _submit(plan: Plan, tracked: TrackedComparison, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
+def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
     folder, keys, length = plan.job.folder, plan.grid.keys(), plan.job.length
     missing = plan.missing(runs)
     if not missing:
         return
 
     def ended(key: RunKey) -> None:
-        trials = recorded(key.path(folder))
+        trials = read_trials(key.path(folder))
         if len(trials) >= length:
             tracked.try_child(key, trials)
 
-    standing = Standing(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
+    standing = BestSoFar(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
     done = sum(min(len(runs.get(key, ())), length) for key in keys)
     with ProgressLine("trials", len(keys) * length, done) as progress:
         submit(plan.job, missing, plan.slots, Watch(progress, standing, ended))
 
 
-def _record(plan: Plan, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
+def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
     runs = list(all_runs(plan.job.folder))
     summary = summary_of(plan.job, plan.setup, runs)
-    settings = {**parameters, **described(key for key, _ in runs), "MLflow run": tracked.run.url}
+    settings = {**parameters, **run_parameters(key for key, _ in runs), "MLflow run": tracked.run.url}
     report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
     for line in lines(summary):
         say(line)

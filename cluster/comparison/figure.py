@@ -92,18 +92,18 @@ def _draw_method(
     curves: Axes, final: Axes, place: int, name: str, method: MethodSummary, limits: tuple[float, float]
 ) -> None:
     """A curve with its shaded interval, and its end once more, where intervals do not cover each other."""
-    colour, marker, line = STYLES.get(name, _OTHER_STYLE)
+    color, marker, line = STYLES.get(name, _OTHER_STYLE)
     mean, low, high = (
         np.array([getattr(estimate, part) for estimate in method.best]) for part in ("mean", "low", "high")
     )
     low, high = np.clip(low, *limits), np.clip(high, *limits)
-    style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 5, "markeredgewidth": 0}
+    style: dict[str, Any] = {"color": color, "marker": marker, "markersize": 5, "markeredgewidth": 0}
     trials = np.arange(1, len(mean) + 1)
     label = f"{name} (n = {method.runs})"
     shown = {"markevery": -(-len(mean) // _MARKERS), "linestyle": line, "linewidth": 1.4, **style}
     curves.plot(trials, mean, label=label, zorder=3, **shown)
-    curves.fill_between(trials, low, high, color=colour, alpha=0.09, linewidth=0, zorder=1)
-    final.plot([place, place], [low[-1], high[-1]], color=colour, linewidth=2.5, alpha=0.5)
+    curves.fill_between(trials, low, high, color=color, alpha=0.09, linewidth=0, zorder=1)
+    final.plot([place, place], [low[-1], high[-1]], color=color, linewidth=2.5, alpha=0.5)
     final.plot([place], [mean[-1]], linestyle="", **{**style, "markersize": 7})
 
 

@@ -60,7 +60,7 @@ def claim(folder: Path, identity: Mapping[str, Any], model: str) -> dict[str, An
         UserError: the folder holds another comparison, or its `comparison.json` is damaged or gone.
     """
     path = folder / IDENTITY
-    found = _read(path, identity) if _begun(folder) else {**identity, "model": ""}
+    found = _read(path, identity) if _has_runs(folder) else {**identity, "model": ""}
     wanted = {**identity, "model": model or found["model"]}
     for name, value in wanted.items():
         if found[name] not in (value, ""):
@@ -74,7 +74,7 @@ def claim(folder: Path, identity: Mapping[str, Any], model: str) -> dict[str, An
     return wanted
 
 
-def _begun(folder: Path) -> bool:
+def _has_runs(folder: Path) -> bool:
     return (folder / IDENTITY).exists() or any((folder / RUNS).iterdir())
 
 

@@ -83,7 +83,7 @@ class Grid:
             ) from error
 
 
-def described(keys: Iterable[RunKey]) -> dict[str, Any]:
+def run_parameters(keys: Iterable[RunKey]) -> dict[str, Any]:
     """What a page says of runs of several commands: all methods, all seeds."""
     found = list(keys)
     runs = sorted({key.run for key in found})
@@ -95,7 +95,7 @@ def described(keys: Iterable[RunKey]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ComparisonPlan:
     """A comparison before it begins.
 
     Attributes:
@@ -162,7 +162,7 @@ class Plan:
             say(f"runs of {', '.join(sorted(others))} in {folder} have fewer trials: they are not compared")
 
 
-def planned(
+def plan_comparison(
     *,
     setup: Setup,
     grid: Grid,
@@ -172,7 +172,7 @@ def planned(
     folder: Path,
     settings: CompareSettings,
     caption: str = "",
-) -> Plan:
+) -> ComparisonPlan:
     """A comparison that can be run.
 
     Args:
@@ -207,7 +207,7 @@ def planned(
         job.require(grid.methods, setup)
     except ValueError as error:
         raise UserError(f"cannot compare (compare.pool_size is {settings.pool_size}): {error}") from error
-    return Plan(
+    return ComparisonPlan(
         setup=setup,
         grid=grid,
         job=job,

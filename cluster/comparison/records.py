@@ -62,7 +62,7 @@ def _drop_torn_line(file: BinaryIO) -> None:
         file.truncate(whole)
 
 
-def recorded(path: Path) -> list[Trial]:
+def read_trials(path: Path) -> list[Trial]:
     """The trials of a run so far, up to the first that is absent.
 
     A last line that was cut off counts as absent. Of a trial recorded twice, by a worker that outlived its
@@ -93,16 +93,16 @@ def _trial(line: dict[str, Any]) -> Trial:
 
 def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
     """Every run of a comparison that has begun, in order."""
-    for key in sorted(_begun(folder)):
-        yield key, recorded(key.path(folder))
+    for key in sorted(_run_keys(folder)):
+        yield key, read_trials(key.path(folder))
 
 
 def seeds_in(folder: Path) -> set[int]:
     """Of all runs that have begun."""
-    return {key.run for key in _begun(folder)}
+    return {key.run for key in _run_keys(folder)}
 
 
-def _begun(folder: Path) -> Iterator[RunKey]:
+def _run_keys(folder: Path) -> Iterator[RunKey]:
     """Of files that are no run's, such as copies, nothing is said."""
     for path in (folder / RUNS).glob("*.jsonl"):
         match = _NAME.fullmatch(path.name)

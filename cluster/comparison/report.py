@@ -14,7 +14,7 @@ from cluster.comparison.html import page
 from cluster.comparison.records import Runs, rows, write_table
 from cluster.comparison.worker import ComparisonJob
 from cluster.files import replacing
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Summary
 from workers.hardware import robots
 from workers.randomness import generator
@@ -37,7 +37,7 @@ class Report:
 def summary_of(job: ComparisonJob, setup: Setup, runs: Runs) -> Summary:
     """Means, intervals and paired differences over all runs of the folder."""
     reporting = Reporting(initial=job.initial, broken_below=setup.broken)
-    return summarise(rows(runs), reporting, generator(0, "bootstrap", 0))
+    return summarize(rows(runs), reporting, generator(0, "bootstrap", 0))
 
 
 def publish(

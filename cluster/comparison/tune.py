@@ -21,11 +21,11 @@ from cluster.runtime.tune import silence_tune
 
 ERRORS = "errors.txt"
 _RUN_FAILURES = 2
-_COLOUR = re.compile(r"\x1b\[\d*m")
+_COLOR = re.compile(r"\x1b\[\d*m")
 
 
 @dataclass
-class Standing:
+class BestSoFar:
     """The best objective so far of every run, those of earlier commands included."""
 
     methods: Sequence[str]
@@ -51,7 +51,7 @@ class Watch(Callback):
     """
 
     progress: ProgressLine
-    standing: Standing
+    standing: BestSoFar
     ended: Callable[[RunKey], None]
     disk: str = ""
 
@@ -127,7 +127,7 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
 
 
 def _failures(folder: Path, results: ResultGrid, asked: int) -> UserError:
-    texts = [_COLOUR.sub("", str(error)).strip() for error in results.errors]
+    texts = [_COLOR.sub("", str(error)).strip() for error in results.errors]
     with writing(folder):
         (folder / ERRORS).write_text("\n\n".join(texts) + "\n")
     return UserError(

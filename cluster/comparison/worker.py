@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from ray import tune
 
-from cluster.comparison.records import RunKey, append, recorded
+from cluster.comparison.records import RunKey, append, read_trials
 from svaedc.bo import methods
 from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
@@ -78,7 +78,7 @@ class ComparisonJob:
             self.trials,
             lambda index: generator(key.run, "suggestion", index),
             time.monotonic,
-            recorded(path),
+            read_trials(path),
         ):
             append(path, trial)
             yield trial

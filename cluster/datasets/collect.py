@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cluster.config import CollectSettings
-from cluster.datasets.gather import growth, planned, rollout_pool, work
-from cluster.datasets.pilot import begin, described, metrics, review, spent
-from cluster.datasets.progress import Tally
-from cluster.datasets.quarantine import FOLDER, quarantined, release
+from cluster.datasets.gather import growth, open_and_plan, rollout_pool, work
+from cluster.datasets.pilot import add_cost, begin, metrics, plan_text, review
+from cluster.datasets.progress import CollectionProgress
+from cluster.datasets.quarantine import FOLDER, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
 from cluster.progress import duration, say
@@ -42,7 +42,7 @@ def collect(
         UserError: the folder holds another dataset, the disk is full, or shards kept failing.
     """
     identity = _identity(setup, seed, repeats, settings)
-    dataset, plan = planned(identity, episodes, folder)
+    dataset, plan = open_and_plan(identity, episodes, folder)
     if not plan:
         release(dataset)  # a driver that was killed at its end may have put aside what another collected
         say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
@@ -51,13 +51,13 @@ def collect(
     session.preflight(actors)
     parameters = _parameters(identity, episodes, actors, settings)
     with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
-        tally = Tally(planned=_size(plan))
+        counts = CollectionProgress(planned=_size(plan))
         pool = rollout_pool(dataset, settings, actors, actor, growth(settings))
         try:
-            work(dataset, plan, episodes, tally, run, pool)
+            work(dataset, plan, episodes, counts, run, pool)
         finally:
-            spent(dataset, tally, pool.actor_seconds)
-        _record(dataset, episodes, tally, run)
+            add_cost(dataset, counts, pool.actor_seconds)
+        _record(dataset, episodes, counts, run)
     return dataset
 
 
@@ -78,7 +78,7 @@ def foretell(
         UserError: as `collect` does, or too little is left to collect.
     """
     identity = _identity(setup, seed, repeats, settings)
-    dataset, plan = planned(identity, episodes, folder)
+    dataset, plan = open_and_plan(identity, episodes, folder)
     actors = min(settings.actor_count(session.cpus), len(plan))
     pilot = plan[: max(PILOT_SHARDS, 2 * actors)]
     if len(pilot) < 2:
@@ -88,17 +88,17 @@ def foretell(
     session.preflight(actors)
     parameters = _parameters(identity, episodes, actors, settings)
     with tracker.run(f"plan {setup.name}", "plan", parameters) as run:
-        tally = Tally(planned=_size(pilot))
-        reports = work(dataset, pilot, episodes, tally, run, rollout_pool(dataset, settings, actors))
+        counts = CollectionProgress(planned=_size(pilot))
+        reports = work(dataset, pilot, episodes, counts, run, rollout_pool(dataset, settings, actors))
         if len(reports) < 2:
             raise UserError(
                 f"{len(pilot) - len(reports)} of {len(pilot)} shards kept failing, so there is no plan; "
                 f"their errors are in {dataset.folder / FOLDER}, and the same command tries them again"
             )
         expected = forecast(reports, _size(plan), actors)
-        begin(dataset, episodes, expected, tally)
-        say(described(expected, _size([report.shard for report in reports])))
-        run.metrics(tally.metrics() | metrics(expected), step=tally.episodes)
+        begin(dataset, episodes, expected, counts)
+        say(plan_text(expected, _size([report.shard for report in reports])))
+        run.metrics(counts.metrics() | metrics(expected), step=counts.episodes)
 
 
 def _identity(setup: Setup, seed: int, repeats: int, settings: CollectSettings) -> Identity:
@@ -130,19 +130,19 @@ def _size(plan: Sequence[Shard]) -> int:
     return sum(shard.episodes for shard in plan)
 
 
-def _record(dataset: Dataset, episodes: int, tally: Tally, run: Run) -> None:
+def _record(dataset: Dataset, episodes: int, counts: CollectionProgress, run: Run) -> None:
     """Say first how it went: the store may fail."""
     release(dataset)
     say(
         f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
-        f"{tally.episodes} new in {duration(tally.seconds)} "
-        f"({tally.rate:.1f}/s, {tally.core_seconds / 3600:.2f} core-hours), "
-        f"mean badness {tally.badness:.2f}, {tally.diverged} diverged, "
-        f"{tally.stopped} stopped, {tally.retries} retries; {run.url}"
+        f"{counts.episodes} new in {duration(counts.seconds)} "
+        f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
+        f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
+        f"{counts.stopped} stopped, {counts.retries} retries; {run.url}"
     )
-    run.metrics(tally.metrics() | review(dataset), step=tally.episodes)
+    run.metrics(counts.metrics() | review(dataset), step=counts.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
-    left = quarantined(dataset, episodes)
+    left = quarantined_shards(dataset, episodes)
     if left:
         raise UserError(
             f"{len(left)} shards kept failing, {left[0].name} among them; their errors are in "

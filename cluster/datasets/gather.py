@@ -9,7 +9,7 @@ from typing import Any
 import ray
 
 from cluster.config import CollectSettings
-from cluster.datasets.progress import Recorder, Tally
+from cluster.datasets.progress import CollectionProgress, ProgressRecorder
 from cluster.datasets.quarantine import put_aside
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
@@ -39,7 +39,7 @@ LAST_REPORTS = 1024
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
 
-def planned(identity: Identity, episodes: int, folder: Location) -> tuple[Dataset, list[Shard]]:
+def open_and_plan(identity: Identity, episodes: int, folder: Location) -> tuple[Dataset, list[Shard]]:
     """The dataset in a folder, begun if need be, and the shards that are missing in it.
 
     Raises:
@@ -87,7 +87,7 @@ def work(
     dataset: Dataset,
     plan: list[Shard],
     episodes: int,
-    tally: Tally,
+    counts: CollectionProgress,
     run: Run,
     pool: Pool[Shard, ShardReport],
 ) -> list[ShardReport]:
@@ -98,7 +98,7 @@ def work(
     """
     try:
         with pool:
-            return _gather(pool.run(plan), dataset, episodes, tally, Recorder(run))
+            return _gather(pool.run(plan), dataset, episodes, counts, ProgressRecorder(run))
     finally:
         _clean(dataset, pool.answers)
 
@@ -114,23 +114,27 @@ def _clean(dataset: Dataset, writers: list[str]) -> None:
 
 
 def _gather(
-    outcomes: Iterable[Outcome], dataset: Dataset, episodes: int, tally: Tally, recorder: Recorder
+    outcomes: Iterable[Outcome],
+    dataset: Dataset,
+    episodes: int,
+    counts: CollectionProgress,
+    recorder: ProgressRecorder,
 ) -> list[ShardReport]:
     reports: deque[ShardReport] = deque(maxlen=LAST_REPORTS)
     left = sum(shard.episodes for shard in dataset.missing(episodes))
     with ProgressLine("episodes", episodes, episodes - left) as progress:
         for outcome in outcomes:
             if isinstance(outcome, Failed):
-                note_failure(outcome, dataset, tally)
+                note_failure(outcome, dataset, counts)
                 continue
-            tally.add(outcome.result)
+            counts.add(outcome.result)
             reports.append(outcome.result)
-            progress.advance(outcome.item.episodes, tally.note())
-            recorder.record(tally)
+            progress.advance(outcome.item.episodes, counts.note())
+            recorder.record(counts)
     return list(reports)
 
 
-def note_failure(failure: Failed[Shard], dataset: Dataset, tally: Tally) -> None:
+def note_failure(failure: Failed[Shard], dataset: Dataset, counts: CollectionProgress) -> None:
     """Say it, keep its error, and put the shard aside after its last attempt.
 
     Raises:
@@ -138,13 +142,13 @@ def note_failure(failure: Failed[Shard], dataset: Dataset, tally: Tally) -> None
     """
     if isinstance(failure.cause, OSError) and failure.cause.errno in _DISK:
         raise _unwritable(dataset, failure.cause)
-    tally.errors[failure.item].append(failure.text)
+    counts.errors[failure.item].append(failure.text)
     if failure.attempts_left:
-        tally.retries += 1
+        counts.retries += 1
         say(f"{failure.item.name} failed and is tried again: {failure.error}")
         return
     try:
-        path = put_aside(dataset, failure.item, tally.errors[failure.item])
+        path = put_aside(dataset, failure.item, counts.errors[failure.item])
     except OSError as error:
         raise _unwritable(dataset, error) from error
     say(f"{failure.item.name} was given up, its errors are in {path}: {failure.error}")

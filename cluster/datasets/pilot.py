@@ -8,9 +8,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from cluster.datasets.progress import Tally
+from cluster.datasets.progress import CollectionProgress
 from cluster.progress import duration, say
-from workers.collection.forecast import LEVEL, Estimate, Forecast
+from workers.collection.forecast import LEVEL, Forecast, Prediction
 from workers.dataset.folder import Dataset
 from workers.dataset.storage.atomic import move, synchronise, temporary_file
 from workers.dataset.storage.location import Location
@@ -18,7 +18,7 @@ from workers.dataset.storage.location import Location
 PLAN = "plan.json"
 
 
-def begin(dataset: Dataset, episodes: int, expected: Forecast, pilot: Tally) -> None:
+def begin(dataset: Dataset, episodes: int, expected: Forecast, pilot: CollectionProgress) -> None:
     """Keep what is expected of a job, in the place of an earlier plan; its pilot is spent already.
 
     Args:
@@ -31,17 +31,17 @@ def begin(dataset: Dataset, episodes: int, expected: Forecast, pilot: Tally) -> 
     _write(dataset, {"episodes": episodes, "expected": expected.to_json(), "spent": account})
 
 
-def spent(dataset: Dataset, tally: Tally, actor_seconds: float) -> None:
+def add_cost(dataset: Dataset, counts: CollectionProgress, actor_seconds: float) -> None:
     """Add what a command has done to the account of the plan, if there is one.
 
     Args:
         dataset: beside which the plan is kept.
-        tally: what has been done.
+        counts: what has been done.
         actor_seconds: for how long there were actors, summed over them.
     """
     plan = _read(dataset)
-    if plan and "off" not in plan and tally.episodes:
-        _write(dataset, {**plan, "spent": [*plan["spent"], _entry(tally, actor_seconds)]})
+    if plan and "off" not in plan and counts.episodes:
+        _write(dataset, {**plan, "spent": [*plan["spent"], _entry(counts, actor_seconds)]})
 
 
 def review(dataset: Dataset) -> dict[str, float]:
@@ -80,7 +80,7 @@ def metrics(expected: Forecast) -> dict[str, float]:
     }
 
 
-def described(expected: Forecast, done: int) -> str:
+def plan_text(expected: Forecast, done: int) -> str:
     """The plan in words, each number with the half width of its interval."""
     core, wall, size, bad = expected.core_hours, expected.hours, expected.size, expected.badness
     lines = (
@@ -95,20 +95,20 @@ def described(expected: Forecast, done: int) -> str:
     return "\n".join(lines)
 
 
-def _text(estimate: Estimate, factor: float) -> str:
+def _text(estimate: Prediction, factor: float) -> str:
     """As many digits as the margin's first two."""
     value, margin = estimate.value * factor, estimate.margin * factor
     places = max(0, 1 - math.floor(math.log10(margin))) if margin else 2
     return f"{value:.{places}f} ± {margin:.{places}f}"
 
 
-def _entry(tally: Tally, actor_seconds: float) -> dict[str, int | float]:
+def _entry(counts: CollectionProgress, actor_seconds: float) -> dict[str, int | float]:
     return {
-        "episodes": tally.episodes,
+        "episodes": counts.episodes,
         "actor_seconds": actor_seconds,
-        "core_seconds": tally.core_seconds,
-        "size": tally.size,
-        "bad": tally.bad,
+        "core_seconds": counts.core_seconds,
+        "size": counts.size,
+        "bad": counts.bad,
     }
 
 

@@ -60,7 +60,7 @@ RECORD_SECONDS = 30.0
 
 
 @dataclass
-class Tally:
+class CollectionProgress:
     """Counts and sums over the shards that this command has collected."""
 
     episodes: int = 0
@@ -114,7 +114,7 @@ class Tally:
         return f"bad {self.badness:.2f}{self.rates.note()}"
 
     def metrics(self) -> dict[str, float]:
-        """The tally as numbers for MLflow, by name."""
+        """The counts as numbers for MLflow, by name."""
         rate = self.rate
         values = {
             "episodes": self.episodes,
@@ -134,8 +134,8 @@ class Tally:
 
 
 @dataclass
-class Recorder:
-    """Records a tally now and then; a store that fails meanwhile must not end hours of work.
+class ProgressRecorder:
+    """Records a counts now and then; a store that fails meanwhile must not end hours of work.
 
     Attributes:
         run: the MLflow run.
@@ -151,12 +151,12 @@ class Recorder:
         """Begin the first interval."""
         self._due = time.monotonic() + self.interval
 
-    def record(self, tally: Tally) -> None:
-        """Record the tally if its time has come; the first failure is said."""
+    def record(self, counts: CollectionProgress) -> None:
+        """Record the counts if its time has come; the first failure is said."""
         if time.monotonic() < self._due:
             return
         try:
-            self.run.metrics(tally.metrics(), step=tally.episodes)
+            self.run.metrics(counts.metrics(), step=counts.episodes)
         except UserError as error:
             self.interval *= 2
             if not self._has_failed:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Sequence
 
 from workers.dataset.folder import Dataset
-from workers.dataset.shards import Shard, named
+from workers.dataset.shards import Shard, shard_named
 from workers.dataset.storage.location import Location, files
 
 FOLDER = "quarantine"
@@ -21,7 +21,7 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
     return path
 
 
-def quarantined(dataset: Dataset, episodes: int = sys.maxsize) -> list[Shard]:
+def quarantined_shards(dataset: Dataset, episodes: int = sys.maxsize) -> list[Shard]:
     """The shards put aside that are needed still.
 
     A later collection may have cut their episodes into other shards, so what counts is the episodes.
@@ -42,7 +42,7 @@ def release(dataset: Dataset) -> None:
 
 def _put_aside(dataset: Dataset) -> Iterator[Shard]:
     for path in files(dataset.folder / FOLDER, "*.json"):
-        yield from named(path.name.removesuffix(".json"))
+        yield from shard_named(path.name.removesuffix(".json"))
 
 
 def _is_needed(dataset: Dataset, shard: Shard, episodes: int) -> bool:

@@ -4,7 +4,7 @@ from typing import Any
 
 import ray
 
-from cluster.hardware.plan import Plan
+from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.station import Station
 from cluster.hardware.status import Status
 
@@ -20,15 +20,15 @@ class HardwareActor:
     def __init__(self) -> None:
         self._station = Station()
 
-    def enter(self, plan: Plan) -> Status:
+    def enter(self, plan: CampaignPlan) -> Status:
         """See `Station.enter`."""
         return self._station.enter(plan)
 
-    def advance(self, plan: Plan) -> Status:
+    def advance(self, plan: CampaignPlan) -> Status:
         """See `Station.advance`."""
         return self._station.advance(plan)
 
-    def withdraw(self, plan: Plan) -> None:
+    def withdraw(self, plan: CampaignPlan) -> None:
         """See `Station.withdraw`; ends the process when the place is empty then."""
         if self._station.withdraw(plan):
             ray.actor.exit_actor()

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from cluster.hardware.events import Trial
+from cluster.hardware.events import CampaignTrial
 from cluster.hardware.journal import Journal
 from cluster.hardware.states import TERMINAL, State
-from cluster.hardware.status import RANDOM_TRIALS, Standing, standing
+from cluster.hardware.status import RANDOM_TRIALS, Phase, phase_of
 from svaedc.bo.history import History
 from workers.hardware.driver import RobotDriver, RobotFault
 from workers.randomness import generator
@@ -42,7 +42,7 @@ class Campaign:
     versions: Mapping[str, str]
 
 
-def advance(campaign: Campaign) -> Standing:
+def advance(campaign: Campaign) -> Phase:
     """Goes on until one trial has ended, or until only a person can go on.
 
     Call it from one thread of the one process that holds the campaign's lock: a trial found granted or
@@ -50,7 +50,7 @@ def advance(campaign: Campaign) -> Standing:
     """
     recover(campaign)
     now = _standing(campaign)
-    while now is Standing.READY:
+    while now is Phase.READY:
         trial = _step(campaign)
         now = _standing(campaign)
         if trial.state in TERMINAL:
@@ -74,7 +74,7 @@ def recover(campaign: Campaign) -> None:
         )
 
 
-def history(trials: tuple[Trial, ...], dimensions: int) -> History:
+def history(trials: tuple[CampaignTrial, ...], dimensions: int) -> History:
     """What the method may learn from: measured trials; failed and aborted ones only as tried before."""
     past = History.empty(dimensions)
     for trial in trials:
@@ -96,28 +96,30 @@ def objection(x: Float[np.ndarray, " n"], dimensions: int) -> str | None:
     return None
 
 
-def trial_id(journal: Journal, trial: Trial) -> str:
+def trial_id(journal: Journal, trial: CampaignTrial) -> str:
     """The name by which the robot's ledger knows a trial."""
     return f"{journal.name}-{trial.number:03d}"
 
 
-def record(journal: Journal, trial: Trial, new: State, who: str, body: Mapping[str, Any]) -> Trial:
+def record(
+    journal: Journal, trial: CampaignTrial, new: State, who: str, body: Mapping[str, Any]
+) -> CampaignTrial:
     """Moves a trial on from exactly the version that the caller has seen, and returns what it became."""
     journal.record(trial.number, new, who, body, f"{trial.number}/{trial.version}/{new}")
     return journal.trial(trial.number)
 
 
-def _standing(campaign: Campaign) -> Standing:
-    return standing(campaign.journal.trials(), campaign.journal.identity)
+def _standing(campaign: Campaign) -> Phase:
+    return phase_of(campaign.journal.trials(), campaign.journal.identity)
 
 
-def _step(campaign: Campaign) -> Trial:
+def _step(campaign: Campaign) -> CampaignTrial:
     """One transition of the open trial, or the proposal of a new one."""
     trial = next((trial for trial in campaign.journal.trials() if trial.state not in TERMINAL), None)
     return propose(campaign) if trial is None else _STEPS[trial.state](campaign, trial)
 
 
-def propose(campaign: Campaign) -> Trial:
+def propose(campaign: Campaign) -> CampaignTrial:
     """Stores the next controller, a function of the journal alone: a kill before or after changes nothing."""
     trials, seed = campaign.journal.trials(), campaign.journal.identity.seed
     number, past = len(trials), history(trials, campaign.dimensions)
@@ -134,7 +136,7 @@ def propose(campaign: Campaign) -> Trial:
     return campaign.journal.trial(number)
 
 
-def _check(campaign: Campaign, trial: Trial) -> Trial:
+def _check(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     reason = objection(trial.x, campaign.dimensions)
     if reason is not None:
         return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": reason})
@@ -142,16 +144,16 @@ def _check(campaign: Campaign, trial: Trial) -> Trial:
     return record(campaign.journal, trial, State.CHECKED, "limits", facts)
 
 
-def _approve_by_policy(campaign: Campaign, trial: Trial) -> Trial:
+def _approve_by_policy(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     return approve(campaign.journal, trial, "policy: rehearsal")
 
 
-def approve(journal: Journal, trial: Trial, who: str) -> Trial:
+def approve(journal: Journal, trial: CampaignTrial, who: str) -> CampaignTrial:
     """Lets one trial onto the robot; the approval names the bytes of its controller."""
     return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256})
 
 
-def _perform(campaign: Campaign, trial: Trial) -> Trial:
+def _perform(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     """Moves the robot once; what the driver declares a fault is failed, all else that breaks is unknown."""
     journal = campaign.journal
     granted = record(journal, trial, State.GRANTED, "executor", campaign.process)
@@ -163,7 +165,7 @@ def _perform(campaign: Campaign, trial: Trial) -> Trial:
     return record(journal, running, State.MEASURED, "executor", asdict(measured))
 
 
-_STEPS: Mapping[State, Callable[[Campaign, Trial], Trial]] = {
+_STEPS: Mapping[State, Callable[[Campaign, CampaignTrial], CampaignTrial]] = {
     State.PROPOSED: _check,
     State.CHECKED: _approve_by_policy,
     State.APPROVED: _perform,

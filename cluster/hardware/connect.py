@@ -13,7 +13,7 @@ from ray.util import list_named_actors
 
 from cluster.errors import UserError
 from cluster.hardware.actor import PREFIX, RESOURCE, HardwareActor
-from cluster.hardware.plan import Plan
+from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.status import Status
 from cluster.runtime.machines import has_a_place
 
@@ -42,7 +42,7 @@ def require_robot_host() -> None:
 
 
 @contextmanager
-def at_the_robot(options: dict[str, Any], plan: Plan, say: Say) -> Iterator[tuple[Any, Status]]:
+def at_the_robot(options: dict[str, Any], plan: CampaignPlan, say: Say) -> Iterator[tuple[Any, Status]]:
     """The robot's actor, the plan entered; it ends after its present trial, whatever happens to the driver.
 
     Args:
@@ -53,20 +53,20 @@ def at_the_robot(options: dict[str, Any], plan: Plan, say: Say) -> Iterator[tupl
     Raises:
         UserError: when there is no place on the robot's machine, or the plan cannot be carried out.
     """
-    actor, first = _entered(options, plan, say)
+    actor, first = _enter(options, plan, say)
     try:
         yield actor, first
     finally:
         _withdraw(actor, plan)
 
 
-def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status]:
+def _enter(options: dict[str, Any], plan: CampaignPlan, say: Say) -> tuple[Any, Status]:
     deadline, made = time.monotonic() + PLACE_SECONDS, 0
     while made < ENTRANCES and time.monotonic() < deadline:
-        actor, is_new = _obtained(options)
+        actor, is_new = _find_or_make(options)
         made += is_new
         try:
-            return actor, _admitted(actor, options, plan, deadline, say)
+            return actor, _wait_for_entry(actor, options, plan, deadline, say)
         except ActorDiedError:
             # An earlier driver's actor on its way out: entering moves nothing, so it may be tried again.
             del actor
@@ -75,10 +75,10 @@ def _entered(options: dict[str, Any], plan: Plan, say: Say) -> tuple[Any, Status
             if is_new:
                 _end(actor, plan)
             raise
-    raise _short_lived(options)
+    raise _dies_at_once(options)
 
 
-def _obtained(options: dict[str, Any]) -> tuple[Any, bool]:
+def _find_or_make(options: dict[str, Any]) -> tuple[Any, bool]:
     """The robot's actor, and whether it is new: one that was there before is not for this command to end."""
     gc.collect()  # a name means its dead actor for as long as a handle of that one lives in this process
     for _ in range(ENTRANCES):
@@ -86,16 +86,18 @@ def _obtained(options: dict[str, Any]) -> tuple[Any, bool]:
             return ray.get_actor(options["name"], options["namespace"]), False
         with suppress(ActorAlreadyExistsError):  # made by another command a moment ago
             return ray.remote(HardwareActor).options(**options).remote(), True
-    raise _short_lived(options)
+    raise _dies_at_once(options)
 
 
-def _short_lived(options: dict[str, Any]) -> UserError:
+def _dies_at_once(options: dict[str, Any]) -> UserError:
     return UserError(
         f"the actor {options['name']} dies whenever it starts; look into the Ray logs of the robot's machine"
     )
 
 
-def _admitted(actor: Any, options: dict[str, Any], plan: Plan, deadline: float, say: Say) -> Status:
+def _wait_for_entry(
+    actor: Any, options: dict[str, Any], plan: CampaignPlan, deadline: float, say: Say
+) -> Status:
     """Waits up to the deadline for an actor without a place, and for one at work until it answers.
 
     A trial under way may take any time, and nothing here can tell its end from outside.
@@ -112,7 +114,7 @@ def _admitted(actor: Any, options: dict[str, Any], plan: Plan, deadline: float, 
     return ray.get(answer)
 
 
-def _end(actor: Any, plan: Plan) -> None:
+def _end(actor: Any, plan: CampaignPlan) -> None:
     """Ends an actor that this command made in vain: it never asked it for a trial.
 
     One without a place would take it later, for nobody, and what is asked of it now dies with this command.
@@ -123,7 +125,7 @@ def _end(actor: Any, plan: Plan) -> None:
         ray.kill(actor)
 
 
-def _withdraw(actor: Any, plan: Plan) -> None:
+def _withdraw(actor: Any, plan: CampaignPlan) -> None:
     ray.wait([actor.withdraw.remote(plan)], timeout=LEAVE_SECONDS)
 
 
@@ -151,5 +153,5 @@ def _no_place(others: list[str]) -> str:
     )
 
 
-def _at_work(plan: Plan) -> str:
+def _at_work(plan: CampaignPlan) -> str:
     return f"the process at {plan.identity.robot} is at work, on a trial perhaps; waiting until it has ended"

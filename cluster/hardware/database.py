@@ -34,7 +34,7 @@ class JournalCorrupt(JournalError):  # noqa: N818 - names the state of the file
     """The journal is not what this program wrote."""
 
 
-def connected(path: Path) -> sqlite3.Connection:
+def connect(path: Path) -> sqlite3.Connection:
     """A connection for which a commit is on disk when it returns (WAL, `synchronous=FULL`)."""
     connection = sqlite3.connect(path, timeout=BUSY_SECONDS, isolation_level=None)
     # SQLite's own decoder reports damaged text like a full disk; this one raises UnicodeDecodeError.
@@ -59,7 +59,7 @@ def reading(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def explained(path: Path) -> Iterator[None]:
+def sqlite_errors(path: Path) -> Iterator[None]:
     """Turns SQLite's errors into messages that say what to do.
 
     Raises:

@@ -15,9 +15,9 @@ from cluster.errors import UserError
 from cluster.hardware import journal, operator
 from cluster.hardware.actor import actor_options
 from cluster.hardware.connect import LEAVE_SECONDS, POLL_SECONDS, Say, at_the_robot, require_robot_host
-from cluster.hardware.plan import Plan
+from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.states import State
-from cluster.hardware.status import Standing, Status
+from cluster.hardware.status import Phase, Status
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 
@@ -27,7 +27,12 @@ Report = Callable[[Status], None]
 
 
 def start(
-    settings: HardwareSettings, session: Session, tracker: Tracker, plan: Plan, report: Report, say: Say
+    settings: HardwareSettings,
+    session: Session,
+    tracker: Tracker,
+    plan: CampaignPlan,
+    report: Report,
+    say: Say,
 ) -> Status:
     """Carries a campaign out, or goes on with it, until it is complete.
 
@@ -45,21 +50,21 @@ def start(
     require_robot_host()
     lifetime = "non_detached" if session.is_local else "detached"
     options = actor_options(plan.identity.robot, settings.namespace, lifetime)
-    with _explained(plan), at_the_robot(options, plan, say) as (actor, first):
+    with _ray_errors(plan), at_the_robot(options, plan, say) as (actor, first):
         parameters = {**asdict(plan.identity), "folder": str(plan.folder)}
         with tracker.run(first.name, "hardware", parameters, {"svaedc.campaign": first.name}) as run:
             return _carry_out(actor, plan, first, run, report, say)
 
 
-def _carry_out(actor: Any, plan: Plan, first: Status, run: Run, report: Report, say: Say) -> Status:
+def _carry_out(actor: Any, plan: CampaignPlan, first: Status, run: Run, report: Report, say: Say) -> Status:
     """Asks for one trial after the other, and records each."""
     _record(run, first, 0)
     report(first)
     before = first
-    while before.standing is not Standing.COMPLETE:
-        if before.standing is Standing.AWAITS_RESOLUTION:
+    while before.standing is not Phase.COMPLETE:
+        if before.standing is Phase.AWAITS_RESOLUTION:
             raise UserError(before.advice)
-        if before.standing is Standing.AWAITS_APPROVAL:
+        if before.standing is Phase.AWAITS_APPROVAL:
             time.sleep(POLL_SECONDS)
         now = _answer(actor.advance.remote(plan), say)
         if now != before:
@@ -92,7 +97,7 @@ def _record(run: Run, status: Status, recorded: int) -> None:
 
 
 @contextmanager
-def _explained(plan: Plan) -> Iterator[None]:
+def _ray_errors(plan: CampaignPlan) -> Iterator[None]:
     """Turns what Ray raises into what happened at the robot."""
     try:
         yield
@@ -104,7 +109,7 @@ def _explained(plan: Plan) -> Iterator[None]:
         raise UserError(_after_loss(plan)) from error
 
 
-def _after_loss(plan: Plan) -> str:
+def _after_loss(plan: CampaignPlan) -> str:
     """What is known once the actor is gone: a trial it may have been running is unknown, never repeated."""
     if not (plan.folder / journal.FILE).exists():
         return (

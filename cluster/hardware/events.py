@@ -22,7 +22,7 @@ def canonical(value: Mapping[str, Any]) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def encoded(x: Float[np.ndarray, " D"]) -> str:
+def encode_controller(x: Float[np.ndarray, " D"]) -> str:
     """A controller as little-endian float64 in hexadecimal: exact, whatever reads it."""
     return x.astype("<f8").tobytes().hex()
 
@@ -65,13 +65,13 @@ class Event:
         fields = {key: value for key, value in asdict(self).items() if key != "hash"}
         return hashlib.sha256(canonical(fields).encode()).hexdigest()
 
-    def sealed(self) -> "Event":
+    def seal(self) -> "Event":
         """The same event with its hash filled in."""
         return replace(self, hash=self.expected_hash())
 
 
 @dataclass(frozen=True)
-class Trial:
+class CampaignTrial:
     """Where one trial stands, and what is known of it.
 
     Attributes:
@@ -113,23 +113,23 @@ class Trial:
         return self.f, self.y
 
 
-def applied(trial: Trial | None, event: Event) -> Trial:
+def apply_event(trial: CampaignTrial | None, event: Event) -> CampaignTrial:
     """The trial after one more event."""
     body = json.loads(event.body)
     if trial is None:
         x_hex = body["x"]
-        return Trial(
+        return CampaignTrial(
             event.trial, body["robot"], event.new, body["kind"], x_hex, digest(x_hex), None, None, version=1
         )
     f, y = (body["f"], body["y"]) if event.new is State.MEASURED else (trial.f, trial.y)
     return replace(trial, state=event.new, f=f, y=y, version=trial.version + 1)
 
 
-def replayed(events: Iterable[Event]) -> dict[int, Trial]:
+def replay(events: Iterable[Event]) -> dict[int, CampaignTrial]:
     """The trials that a sequence of events adds up to, by number."""
-    trials: dict[int, Trial] = {}
+    trials: dict[int, CampaignTrial] = {}
     for event in events:
-        trials[event.trial] = applied(trials.get(event.trial), event)
+        trials[event.trial] = apply_event(trials.get(event.trial), event)
     return trials
 
 

@@ -11,7 +11,7 @@ from cluster.hardware.campaign import Campaign
 from cluster.hardware.events import utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
-from cluster.hardware.plan import Plan
+from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.proposals import Proposals, library_versions
 from cluster.hardware.status import Status, status
 from workers import setups
@@ -34,7 +34,7 @@ class Executor:
         UserError: when the model is missing or another's.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: CampaignPlan) -> None:
         self.plan = plan
         with ExitStack() as stack:
             _make(plan.folder)
@@ -52,7 +52,7 @@ class Executor:
 
     def status(self) -> Status:
         """How the campaign stands."""
-        return status(self._journal, Process.own())
+        return status(self._journal, Process.current())
 
     def close(self) -> None:
         """Stops the robot and lets another process execute the campaign."""
@@ -68,7 +68,7 @@ def _make(folder: Path) -> None:
         ) from error
 
 
-def _journal(plan: Plan) -> Journal:
+def _journal(plan: CampaignPlan) -> Journal:
     path = plan.folder / journal.FILE
     journal.create(path, f"{plan.identity.robot}-{uuid4().hex[:8]}", plan.identity)
     opened = Journal(path, utc_now)
@@ -76,7 +76,7 @@ def _journal(plan: Plan) -> Journal:
     return opened
 
 
-def _campaign(plan: Plan, opened: Journal) -> Campaign:
+def _campaign(plan: CampaignPlan, opened: Journal) -> Campaign:
     identity = plan.identity
     setup = setups.load(identity.setup)
     proposals = Proposals.of(identity, setup, plan.model)
@@ -86,6 +86,6 @@ def _campaign(plan: Plan, opened: Journal) -> Campaign:
         suggest=proposals.suggest,
         predict=proposals.predicted_badness,
         dimensions=setup.dimensions,
-        process=asdict(Process.own()),
+        process=asdict(Process.current()),
         versions=library_versions(),
     )

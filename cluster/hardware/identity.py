@@ -20,7 +20,7 @@ class Approval(StrEnum):
 
 
 @dataclass(frozen=True)
-class Identity:
+class CampaignIdentity:
     """The arguments from which every proposal of a campaign follows, and who approves them.
 
     Attributes:
@@ -55,7 +55,7 @@ class Identity:
         """Hash that the first event of the campaign called `name` follows."""
         return hashlib.sha256(canonical({**asdict(self), "name": name}).encode()).hexdigest()
 
-    def require(self, asked: "Identity", place: str) -> None:
+    def require(self, asked: "CampaignIdentity", place: str) -> None:
         """Refuses another campaign in the same folder.
 
         Args:

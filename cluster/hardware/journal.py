@@ -11,14 +11,23 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from cluster.hardware.database import SCHEMA, JournalError, connected, corrupt, explained, reading, writing
-from cluster.hardware.events import Event, Trial, applied, broken_link, canonical, digest, encoded, replayed
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.database import SCHEMA, JournalError, connect, corrupt, reading, sqlite_errors, writing
+from cluster.hardware.events import (
+    CampaignTrial,
+    Event,
+    apply_event,
+    broken_link,
+    canonical,
+    digest,
+    encode_controller,
+    replay,
+)
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.states import LEGAL, State, is_legal
 
 FILE = "journal.sqlite"
 EVENT_COLUMNS = ", ".join(field.name for field in fields(Event))
-TRIAL_COLUMNS = ", ".join(field.name for field in fields(Trial))
+TRIAL_COLUMNS = ", ".join(field.name for field in fields(CampaignTrial))
 INSERT_EVENT = f"INSERT INTO event ({EVENT_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 UPSERT_TRIAL = f"""INSERT INTO trial ({TRIAL_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)
     ON CONFLICT (number) DO UPDATE
@@ -62,8 +71,8 @@ class Journal:
             )
         self.path = path
         self._clock = clock
-        with explained(path):
-            self._connection = connected(path)
+        with sqlite_errors(path):
+            self._connection = connect(path)
             self.name, self.identity = self._campaign()
         self.verify()
 
@@ -86,7 +95,7 @@ class Journal:
         Raises:
             KeyReused: when the trial exists with other content.
         """
-        x_hex = encoded(x)
+        x_hex = encode_controller(x)
         body = {"robot": self.identity.robot, "kind": kind, "x": x_hex, "sha256": digest(x_hex), **facts}
         return self.record(number, State.PROPOSED, who, body, f"{number}/0/{State.PROPOSED}")
 
@@ -105,27 +114,27 @@ class Journal:
             RobotTaken: when another trial of the robot is granted, running or unknown.
             KeyReused: when the key belongs to another request.
         """
-        with explained(self.path), writing(self._connection):
+        with sqlite_errors(self.path), writing(self._connection):
             known = self._events("WHERE idem = ?", idem)
             if known:
-                return _repeated(known[0], number, new, who, canonical(body))
+                return _repeat(known[0], number, new, who, canonical(body))
             trial = self._trial(number)
             old = trial.state if trial else None
             if not is_legal(old, new):
                 raise IllegalTransition(_forbidden(number, old, new))
             seq, prev = self._head()
             at = self._clock().isoformat()
-            event = Event(seq + 1, number, old, new, at, who, idem, canonical(body), prev, "").sealed()
-            self._write(event, applied(trial, event))
+            event = Event(seq + 1, number, old, new, at, who, idem, canonical(body), prev, "").seal()
+            self._write(event, apply_event(trial, event))
             return event
 
-    def trial(self, number: int) -> Trial:
+    def trial(self, number: int) -> CampaignTrial:
         """One trial.
 
         Raises:
             JournalError: when the campaign has no trial of that number.
         """
-        with explained(self.path):
+        with sqlite_errors(self.path):
             trial = self._trial(number)
         if trial is None:
             raise JournalError(
@@ -133,15 +142,15 @@ class Journal:
             )
         return trial
 
-    def trials(self) -> tuple[Trial, ...]:
+    def trials(self) -> tuple[CampaignTrial, ...]:
         """Every trial, by number."""
-        with explained(self.path):
+        with sqlite_errors(self.path):
             rows = self._connection.execute(f"SELECT {TRIAL_COLUMNS} FROM trial ORDER BY number").fetchall()
         return tuple(_trial(row) for row in rows)
 
     def events(self) -> tuple[Event, ...]:
         """Every event, oldest first."""
-        with explained(self.path):
+        with sqlite_errors(self.path):
             return self._events("ORDER BY seq")
 
     def verify(self) -> None:
@@ -150,7 +159,7 @@ class Journal:
         Raises:
             JournalCorrupt: naming the first thing that is wrong.
         """
-        with explained(self.path), reading(self._connection):
+        with sqlite_errors(self.path), reading(self._connection):
             verdict = self._connection.execute("PRAGMA integrity_check").fetchone()[0]
             try:
                 broken = self._inconsistency() if verdict == "ok" else verdict
@@ -162,11 +171,11 @@ class Journal:
     def _inconsistency(self) -> str | None:
         events, trials = self._events("ORDER BY seq"), self.trials()
         broken = broken_link(events, self.identity.genesis(self.name))
-        if broken is None and replayed(events) != {trial.number: trial for trial in trials}:
+        if broken is None and replay(events) != {trial.number: trial for trial in trials}:
             return "its table of trials is not what its events add up to"
         return broken
 
-    def _campaign(self) -> tuple[str, Identity]:
+    def _campaign(self) -> tuple[str, CampaignIdentity]:
         if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
             raise _absent(self.path)
         query = "SELECT name, robot, setup, method, seed, model, pool, trials, approval FROM campaign"
@@ -175,7 +184,7 @@ class Journal:
             if row is None:
                 raise corrupt(self.path, "it names no campaign")
             name, robot, setup, method, seed, model, pool, trials, approval = row
-            return name, Identity(robot, setup, method, seed, model, pool, trials, Approval(approval))
+            return name, CampaignIdentity(robot, setup, method, seed, model, pool, trials, Approval(approval))
         except ValueError as error:
             raise corrupt(self.path, str(error)) from error
 
@@ -183,7 +192,7 @@ class Journal:
         last = self._connection.execute("SELECT seq, hash FROM event ORDER BY seq DESC LIMIT 1").fetchone()
         return last or (0, self.identity.genesis(self.name))
 
-    def _trial(self, number: int) -> Trial | None:
+    def _trial(self, number: int) -> CampaignTrial | None:
         query = f"SELECT {TRIAL_COLUMNS} FROM trial WHERE number = ?"
         row = self._connection.execute(query, (number,)).fetchone()
         return _trial(row) if row else None
@@ -192,7 +201,7 @@ class Journal:
         rows = self._connection.execute(f"SELECT {EVENT_COLUMNS} FROM event {clause}", values).fetchall()
         return tuple(_event(row) for row in rows)
 
-    def _write(self, event: Event, trial: Trial) -> None:
+    def _write(self, event: Event, trial: CampaignTrial) -> None:
         self._connection.execute(INSERT_EVENT, astuple(event))
         try:
             self._connection.execute(UPSERT_TRIAL, astuple(trial))
@@ -203,7 +212,7 @@ class Journal:
             ) from taken
 
 
-def create(path: Path, name: str, identity: Identity) -> None:
+def create(path: Path, name: str, identity: CampaignIdentity) -> None:
     """Creates the journal of a campaign; changes nothing when the file already holds one.
 
     Args:
@@ -212,7 +221,7 @@ def create(path: Path, name: str, identity: Identity) -> None:
         identity: what the campaign is.
     """
     values = (name, *astuple(identity))
-    with explained(path), closing(connected(path)) as connection, writing(connection):
+    with sqlite_errors(path), closing(connect(path)) as connection, writing(connection):
         for statement in SCHEMA:
             connection.execute(statement)
         connection.execute("INSERT OR IGNORE INTO campaign VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
@@ -223,7 +232,7 @@ def _absent(path: Path) -> JournalError:
     return JournalError(f"no campaign in {path.parent}: name the folder of one, or start one there")
 
 
-def _repeated(event: Event, number: int, new: State, who: str, body: str) -> Event:
+def _repeat(event: Event, number: int, new: State, who: str, body: str) -> Event:
     if (event.trial, event.new, event.who, event.body) != (number, new, who, body):
         raise KeyReused(
             f"key {event.idem!r} already stands for trial {event.trial} -> {event.new} by {event.who!r}; the "
@@ -237,9 +246,9 @@ def _forbidden(number: int, old: State | None, new: State) -> str:
     return f"trial {number} cannot go from {old or 'not existing'} to {new}; legal from there: {legal}"
 
 
-def _trial(row: tuple[Any, ...]) -> Trial:
+def _trial(row: tuple[Any, ...]) -> CampaignTrial:
     number, robot, state, *rest = row
-    return Trial(number, robot, State(state), *rest)
+    return CampaignTrial(number, robot, State(state), *rest)
 
 
 def _event(row: tuple[Any, ...]) -> Event:

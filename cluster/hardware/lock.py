@@ -34,7 +34,7 @@ class Process:
     pid: int
 
     @classmethod
-    def own(cls) -> "Process":
+    def current(cls) -> "Process":
         """The process that asks."""
         boot = BOOT_ID.read_text().strip() if BOOT_ID.exists() else ""
         return cls(socket.gethostname(), boot, os.getpid())
@@ -58,7 +58,7 @@ class FolderLock:
         path = folder / FILE
         self._file = path.open("a+")
         deadline = time.monotonic() + patience
-        while not _locked(self._file.fileno()):
+        while not _try_lock(self._file.fileno()):
             if time.monotonic() >= deadline:
                 self._file.close()
                 raise FolderTaken(
@@ -66,7 +66,7 @@ class FolderLock:
                 )
             time.sleep(POLL_SECONDS)
         self._file.truncate(0)
-        self._file.write(json.dumps(asdict(Process.own())))
+        self._file.write(json.dumps(asdict(Process.current())))
         self._file.flush()
 
     def close(self) -> None:
@@ -95,7 +95,7 @@ def holder(folder: Path) -> Process | None:
     return None
 
 
-def _locked(descriptor: int) -> bool:
+def _try_lock(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

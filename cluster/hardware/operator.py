@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cluster.errors import UsageError
 from cluster.hardware import campaign, journal, lock
-from cluster.hardware.events import Trial, canonical, utc_now
+from cluster.hardware.events import CampaignTrial, canonical, utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.states import State
@@ -25,11 +25,11 @@ def status(folder: Path) -> Status:
     Raises:
         JournalError: when there is none, or its journal is damaged.
     """
-    with _opened(folder) as opened:
+    with _open(folder) as opened:
         return look(opened, lock.holder(folder))
 
 
-def approve(folder: Path, trial: int, who: str) -> Trial:
+def approve(folder: Path, trial: int, who: str) -> CampaignTrial:
     """Lets a checked trial onto the robot.
 
     Args:
@@ -40,13 +40,13 @@ def approve(folder: Path, trial: int, who: str) -> Trial:
     Raises:
         IllegalTransition: when the trial does not wait for approval.
     """
-    with _opened(folder) as opened:
-        return campaign.approve(opened, opened.trial(trial), _named(who))
+    with _open(folder) as opened:
+        return campaign.approve(opened, opened.trial(trial), _require_name(who))
 
 
 def resolve(
     folder: Path, trial: int, outcome: str, who: str, note: str, f: float | None, y: float | None
-) -> Trial:
+) -> CampaignTrial:
     """Says what became of an unknown trial, or amends a measured one; the old value stays in the events.
 
     Args:
@@ -65,8 +65,8 @@ def resolve(
     """
     new, body = _resolution(outcome, note, f, y)
     close_abandoned(folder, patience=0.0)
-    with _opened(folder) as opened:
-        return campaign.record(opened, opened.trial(trial), new, _named(who), body)
+    with _open(folder) as opened:
+        return campaign.record(opened, opened.trial(trial), new, _require_name(who), body)
 
 
 def close_abandoned(folder: Path, patience: float) -> None:
@@ -79,31 +79,31 @@ def close_abandoned(folder: Path, patience: float) -> None:
     Raises:
         FolderTaken: when it is alive.
     """
-    with _opened(folder) as opened:
+    with _open(folder) as opened:
         running = [trial for trial in opened.trials() if trial.state is State.RUNNING]
         if running:
             with FolderLock(folder, patience):
                 for trial in running:
                     motion = MotionLedger(folder / ledger.FILE).motion(campaign.trial_id(opened, trial))
-                    facts = {"ledger": asdict(motion), "found_by": asdict(Process.own())}
+                    facts = {"ledger": asdict(motion), "found_by": asdict(Process.current())}
                     campaign.record(opened, trial, State.UNKNOWN, "recovery", facts)
 
 
 def export(folder: Path) -> Iterator[str]:
     """The journal as JSON lines: the campaign first, then every event, oldest first."""
-    with _opened(folder) as opened:
+    with _open(folder) as opened:
         yield canonical({"campaign": opened.name, **asdict(opened.identity)})
         for event in opened.events():
             yield canonical(asdict(event))
 
 
 @contextmanager
-def _opened(folder: Path) -> Iterator[Journal]:
+def _open(folder: Path) -> Iterator[Journal]:
     with closing(Journal(folder / journal.FILE, utc_now)) as opened:
         yield opened
 
 
-def _named(who: str) -> str:
+def _require_name(who: str) -> str:
     if not who.strip():
         raise UsageError("who must name a person, got nothing; give --who NAME")
     return f"operator: {who.strip()}"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cluster.errors import UsageError
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.proposals import fingerprint
 from svaedc.bo import methods
 from workers.hardware import robots
@@ -12,7 +12,7 @@ from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
 
 
 @dataclass(frozen=True)
-class Plan:
+class CampaignPlan:
     """What a person asks for.
 
     Attributes:
@@ -22,7 +22,7 @@ class Plan:
         pace: least duration of a trial on a rehearsal robot, in s, at most a day.
     """
 
-    identity: Identity
+    identity: CampaignIdentity
     folder: Path
     model: Path | None
     pace: float
@@ -37,7 +37,7 @@ class Plan:
 
 def identify(
     robot: str, method: str, trials: int, seed: int, pool: int, model: Path | None, approval: Approval
-) -> Identity:
+) -> CampaignIdentity:
     """What a campaign with these arguments is.
 
     Args:
@@ -58,6 +58,6 @@ def identify(
         if needs_model and model is None:
             raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
         digest = fingerprint(model) if needs_model and model else ""
-        return Identity(robot, setup, method, seed, digest, pool, trials, approval)
+        return CampaignIdentity(robot, setup, method, seed, digest, pool, trials, approval)
     except (LookupError, ValueError) as error:
         raise UsageError(str(error.args[0])) from error

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from cluster.errors import UserError
 from cluster.hardware.campaign import Suggest
-from cluster.hardware.identity import Identity
+from cluster.hardware.identity import CampaignIdentity
 from svaedc.bo import methods
 from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
@@ -38,7 +38,7 @@ class Proposals:
     latents: Latents | None
 
     @classmethod
-    def of(cls, identity: Identity, setup: Setup, model: Path | None) -> "Proposals":
+    def of(cls, identity: CampaignIdentity, setup: Setup, model: Path | None) -> "Proposals":
         """Builds the method from the campaign's identity alone, so that every process builds the same.
 
         Raises:
@@ -85,7 +85,7 @@ def library_versions() -> dict[str, str]:
     return {library: version(library) for library in LIBRARIES}
 
 
-def _network(identity: Identity, model: Path | None) -> SvaeDc:
+def _network(identity: CampaignIdentity, model: Path | None) -> SvaeDc:
     if model is None:
         raise UserError(f"method {identity.method!r} needs a trained model, got none; give one with --model")
     if fingerprint(model) != identity.model:

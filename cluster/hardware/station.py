@@ -4,7 +4,7 @@ from time import monotonic
 
 from cluster.errors import UserError
 from cluster.hardware.executor import Executor
-from cluster.hardware.plan import Plan
+from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.status import Status
 
 IDLE_SECONDS = 60.0
@@ -22,7 +22,7 @@ class Station:
         self._executor: Executor | None = None
         self._asked = monotonic()
 
-    def enter(self, plan: Plan) -> Status:
+    def enter(self, plan: CampaignPlan) -> Status:
         """Takes the place, or goes on with the same plan.
 
         Raises:
@@ -39,7 +39,7 @@ class Station:
         self._asked = monotonic()
         return self._executor.status()
 
-    def advance(self, plan: Plan) -> Status:
+    def advance(self, plan: CampaignPlan) -> Status:
         """Goes on with a campaign up to the end of one trial; see `Executor.advance`.
 
         Raises:
@@ -54,7 +54,7 @@ class Station:
         finally:
             self._asked = monotonic()
 
-    def withdraw(self, plan: Plan) -> bool:
+    def withdraw(self, plan: CampaignPlan) -> bool:
         """Gives the place up unless another campaign has it; whether the place is empty then."""
         if self._executor is not None and not _is_same(self._executor.plan, plan):
             return False
@@ -68,6 +68,6 @@ class Station:
         self._executor = None
 
 
-def _is_same(one: Plan, other: Plan) -> bool:
+def _is_same(one: CampaignPlan, other: CampaignPlan) -> bool:
     """Whether two plans mean the same campaign; its pace may differ."""
     return (one.identity, one.folder) == (other.identity, other.folder)

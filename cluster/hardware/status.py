@@ -4,8 +4,8 @@ import json
 from dataclasses import dataclass
 from enum import StrEnum
 
-from cluster.hardware.events import Trial
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.events import CampaignTrial
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import Process
 from cluster.hardware.states import TERMINAL, State
@@ -14,7 +14,7 @@ RANDOM_TRIALS = 2
 """Measured before the first suggestion, as in the paper's hardware runs."""
 
 
-class Standing(StrEnum):
+class Phase(StrEnum):
     """What a campaign needs next."""
 
     READY = "ready"
@@ -24,7 +24,7 @@ class Standing(StrEnum):
     COMPLETE = "complete"
 
 
-def standing(trials: tuple[Trial, ...], identity: Identity) -> Standing:
+def phase_of(trials: tuple[CampaignTrial, ...], identity: CampaignIdentity) -> Phase:
     """What a campaign needs next, as a function of its trials alone.
 
     Args:
@@ -33,22 +33,22 @@ def standing(trials: tuple[Trial, ...], identity: Identity) -> Standing:
     """
     state = next((trial.state for trial in trials if trial.state not in TERMINAL), None)
     if state is State.UNKNOWN:
-        return Standing.AWAITS_RESOLUTION
+        return Phase.AWAITS_RESOLUTION
     if state in (State.GRANTED, State.RUNNING):
-        return Standing.RUNNING
+        return Phase.RUNNING
     if state is State.CHECKED and identity.approval is Approval.OPERATOR:
-        return Standing.AWAITS_APPROVAL
-    if state is None and measured(trials) >= planned(identity):
-        return Standing.COMPLETE
-    return Standing.READY
+        return Phase.AWAITS_APPROVAL
+    if state is None and measured_trials(trials) >= planned_trials(identity):
+        return Phase.COMPLETE
+    return Phase.READY
 
 
-def planned(identity: Identity) -> int:
+def planned_trials(identity: CampaignIdentity) -> int:
     """Measured trials after which a campaign is complete."""
     return RANDOM_TRIALS + identity.trials
 
 
-def measured(trials: tuple[Trial, ...]) -> int:
+def measured_trials(trials: tuple[CampaignTrial, ...]) -> int:
     """How many trials have been measured."""
     return sum(trial.state is State.MEASURED for trial in trials)
 
@@ -69,20 +69,20 @@ class Status:
     """
 
     name: str
-    identity: Identity
-    standing: Standing
-    trials: tuple[Trial, ...]
+    identity: CampaignIdentity
+    standing: Phase
+    trials: tuple[CampaignTrial, ...]
     advice: str
 
     @property
     def planned(self) -> int:
         """Measured trials after which the campaign is complete."""
-        return planned(self.identity)
+        return planned_trials(self.identity)
 
     @property
     def measured(self) -> int:
         """Trials measured so far."""
-        return measured(self.trials)
+        return measured_trials(self.trials)
 
     @property
     def best(self) -> float | None:
@@ -98,32 +98,32 @@ def status(journal: Journal, executor: Process | None) -> Status:
         executor: the live process that executes it; None when there is none.
     """
     trials = journal.trials()
-    now = standing(trials, journal.identity)
+    now = phase_of(trials, journal.identity)
     return Status(journal.name, journal.identity, now, trials, _advice(journal, trials, now, executor))
 
 
-def _advice(journal: Journal, trials: tuple[Trial, ...], now: Standing, executor: Process | None) -> str:
+def _advice(journal: Journal, trials: tuple[CampaignTrial, ...], now: Phase, executor: Process | None) -> str:
     folder = journal.path.parent
     number = next((trial.number for trial in trials if trial.state not in TERMINAL), None)
-    if now is Standing.AWAITS_RESOLUTION:
+    if now is Phase.AWAITS_RESOLUTION:
         return (
             f"trial {number} may have moved the robot when the program died{_on_record(journal)}. When the "
             f"robot stands still and is reset: svaedc hardware resolve {folder} --trial {number} "
             "--outcome measured|failed|aborted --who NAME --note TEXT (--f and --y for measured); "
             "then repeat the start command"
         )
-    if now is Standing.AWAITS_APPROVAL:
+    if now is Phase.AWAITS_APPROVAL:
         return f"trial {number} waits: svaedc hardware approve {folder} --trial {number} --who NAME"
     if trials and trials[-1].state in REASONS:
         last = trials[-1].number
         return f"trial {last} was {_reason(journal, last)}; see to it, then repeat the start command"
     if executor is not None:
         return f"executed by {executor}"
-    if now is Standing.RUNNING:
+    if now is Phase.RUNNING:
         return (
             f"trial {number} was left behind by a dead process: repeat the start command to have it examined"
         )
-    return "" if now is Standing.COMPLETE else "repeat the start command to go on"
+    return "" if now is Phase.COMPLETE else "repeat the start command to go on"
 
 
 def _reason(journal: Journal, number: int) -> str:

@@ -18,7 +18,7 @@ from workers.setups import Setup
 FORMS = "random:SEED, dataset:FOLDER:INDEX, the path of an .npy file, or numbers separated by commas"
 
 
-def exhibit(wanted: str, setup: Setup, seed: int | None) -> Episode:
+def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
     """The episode of a controller; one of a dataset comes as it was recorded.
 
     Args:
@@ -33,18 +33,18 @@ def exhibit(wanted: str, setup: Setup, seed: int | None) -> Episode:
     """
     kind, _, rest = wanted.partition(":")
     if kind == "dataset":
-        recorded = _recorded(wanted, rest, setup)
-        return recorded if seed is None else _performed(setup, recorded.x, drawn(setup, seed))
-    x = _random(wanted, rest, setup) if kind == "random" else _given(wanted, setup)
-    return _performed(setup, x, setup.physics.middle() if seed is None else drawn(setup, seed))
+        recorded = _dataset_episode(wanted, rest, setup)
+        return recorded if seed is None else _roll_out(setup, recorded.x, first_physics(setup, seed))
+    x = _random(wanted, rest, setup) if kind == "random" else _controller(wanted, setup)
+    return _roll_out(setup, x, setup.physics.middle() if seed is None else first_physics(setup, seed))
 
 
-def drawn(setup: Setup, seed: int) -> Physics:
+def first_physics(setup: Setup, seed: int) -> Physics:
     """The physics of episode 0 of a dataset with that seed."""
     return setup.physics.draw(generator(seed, "physics", 0))
 
 
-def _performed(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
+def _roll_out(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
     with setup.open() as environment:
         return rollout(setup, environment, x, physics)
 
@@ -61,15 +61,15 @@ def _whole(wanted: str, text: str, name: str) -> int:
     return int(text)
 
 
-def _given(wanted: str, setup: Setup) -> np.ndarray:
-    with _explained(wanted, setup):
+def _controller(wanted: str, setup: Setup) -> np.ndarray:
+    with _errors_named(wanted, setup):
         if wanted.endswith(".npy"):
             return unit_cube(np.load(Path(wanted).expanduser(), allow_pickle=False), setup.dimensions)
         return unit_cube([float(number) for number in wanted.split(",")], setup.dimensions)
 
 
 @contextmanager
-def _explained(wanted: str, setup: Setup) -> Iterator[None]:
+def _errors_named(wanted: str, setup: Setup) -> Iterator[None]:
     shown = wanted if len(wanted) <= 60 else wanted[:57] + "..."
     try:
         yield
@@ -80,7 +80,7 @@ def _explained(wanted: str, setup: Setup) -> Iterator[None]:
         ) from error
 
 
-def _recorded(wanted: str, rest: str, setup: Setup) -> Episode:
+def _dataset_episode(wanted: str, rest: str, setup: Setup) -> Episode:
     folder, _, place = rest.rpartition(":")
     if not folder:
         raise UsageError(f"--x {wanted} names no episode; write dataset:FOLDER:INDEX")

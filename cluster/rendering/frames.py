@@ -23,7 +23,7 @@ TITLE = 20  # pixels; even, as an .mp4 asks
 _INK, _PAPER = (20, 24, 32), (250, 250, 250)
 
 
-def captioned(
+def caption(
     picture: UInt8[np.ndarray, "height width 3"], corner: str, note: str, conditions: tuple[str, ...]
 ) -> UInt8[np.ndarray, "height width 3"]:
     """A copy of the picture with text on it.
@@ -47,7 +47,9 @@ def captioned(
     return np.asarray(image)
 
 
-def headed(picture: UInt8[np.ndarray, "height width 3"], title: str) -> UInt8[np.ndarray, "taller width 3"]:
+def add_title(
+    picture: UInt8[np.ndarray, "height width 3"], title: str
+) -> UInt8[np.ndarray, "taller width 3"]:
     """The picture below a white strip with a title, which is cut where it is wider."""
     font = ImageFont.load_default(TITLE // 2 + 2)
     strip = Image.new("RGB", (picture.shape[1], TITLE), _PAPER)
@@ -56,10 +58,10 @@ def headed(picture: UInt8[np.ndarray, "height width 3"], title: str) -> UInt8[np
 
 
 def _write(
-    draw: ImageDraw.ImageDraw, place: tuple[int, int], anchor: str, text: str, colour: tuple[int, int, int]
+    draw: ImageDraw.ImageDraw, place: tuple[int, int], anchor: str, text: str, color: tuple[int, int, int]
 ) -> None:
     font = ImageFont.load_default(max(11, draw.im.size[1] // 18))
-    draw.text(place, text, fill=colour, font=font, anchor=anchor, stroke_width=1, stroke_fill=_PAPER)
+    draw.text(place, text, fill=color, font=font, anchor=anchor, stroke_width=1, stroke_fill=_PAPER)
 
 
 SHORTEST, LONGEST = 5.0, 8.0  # s of a clip whose speed nobody chose
@@ -116,14 +118,15 @@ def clip(setup: Setup, episode: Episode, speed: float, rate: int) -> list[Moment
     count = max(1, round(setup.horizon * slowest / speed))
     edges = np.rint(np.linspace(0, setup.horizon, count + 1)).astype(int)
     return [
-        Moment(stop - 1, held(setup, episode.bad[start:stop])) for start, stop in pairwise(edges.tolist())
+        Moment(stop - 1, conditions_in(setup, episode.bad[start:stop]))
+        for start, stop in pairwise(edges.tolist())
     ]
 
 
 def stills(setup: Setup, episode: Episode, count: int) -> list[Moment]:
     """Moments evenly over an episode, its first and last step among them; each tells what holds just then."""
     steps = np.rint(np.linspace(0, setup.horizon - 1, count)).astype(int).tolist()
-    return [Moment(step, held(setup, episode.bad[step : step + 1])) for step in steps]
+    return [Moment(step, conditions_in(setup, episode.bad[step : step + 1])) for step in steps]
 
 
 def pictures(
@@ -135,11 +138,11 @@ def pictures(
     with ProgressLine("pictures", len(steps), 0) as progress:
         for moment, picture in zip(moments, drawn, strict=True):
             corner = f"{(moment.step + 1) * setup.control_step:.2f} s"
-            yield captioned(picture, corner, note, moment.conditions)
+            yield caption(picture, corner, note, moment.conditions)
             progress.advance(1, "")
 
 
-def held(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
+def conditions_in(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
     """The bad conditions that hold in any of some steps; a graded one with its greatest degree."""
     if bad.dtype == np.float32:
         degree = float(bad.max())
@@ -150,7 +153,7 @@ def held(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
 
 def summary(setup: Setup, episode: Episode) -> str:
     """One line: objective, badness, which conditions made it, and why the episode stopped."""
-    reasons = held(setup, episode.bad)
+    reasons = conditions_in(setup, episode.bad)
     stopped = f"; stopped: {episode.stop}" if episode.stop else ""
     because = f" ({', '.join(reasons)})" if reasons else ""
     return f"{setup.name}: objective {episode.f:+.3g}, badness {episode.y:.2f}{because}{stopped}"

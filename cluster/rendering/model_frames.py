@@ -13,14 +13,14 @@ from cluster.files import replacing
 from cluster.inputs import setup_of
 from cluster.models import trained_model
 from cluster.progress import ProgressLine, say
-from cluster.rendering.frames import Moment, captioned, headed, stills, summary
+from cluster.rendering.frames import Moment, add_title, caption, stills, summary
 from cluster.rendering.video import STILLS, Picture, mosaic, write
-from svaedc.model.reconstruction import Rendition, remarkable, renditions
+from svaedc.model.reconstruction import Reconstruction, reconstructions, remarkable
 from svaedc.model.svae_dc import SvaeDc
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset
 from workers.rendering import Size, frames, scenery_of
-from workers.rollout import Episode, degrees, sampled
+from workers.rollout import Episode, degrees, stride_steps
 from workers.setups import Setup
 
 ACROSS = 2  # blocks beside each other
@@ -31,7 +31,7 @@ RATE = 4  # pictures per second of the clip that a training leaves
 
 
 @dataclass(frozen=True)
-class Telling:
+class ModelView:
     """An episode and what a model makes of it.
 
     Attributes:
@@ -43,17 +43,17 @@ class Telling:
 
     title: str
     episode: Episode
-    told: tuple[Rendition, ...]
+    told: tuple[Reconstruction, ...]
     stride: int
 
 
-def telling(title: str, episode: Episode, model: SvaeDc, stride: int) -> Telling:
+def model_view(title: str, episode: Episode, model: SvaeDc, stride: int) -> ModelView:
     """What a model makes of an episode.
 
     Raises:
         ValueError: the episode is not of the sizes that the model was trained on.
     """
-    steps = sampled(episode.xi.shape[1], stride)
+    steps = stride_steps(episode.xi.shape[1], stride)
     found = (len(episode.x), len(episode.xi), len(range(episode.xi.shape[1])[steps]))
     config = model.config
     expected = (config.controller_dim, config.observation_dim, config.time_steps)
@@ -63,10 +63,10 @@ def telling(title: str, episode: Episode, model: SvaeDc, stride: int) -> Telling
             "name a model that was trained on this setup"
         )
     xi, bad = episode.xi[:, steps], degrees(episode.bad[steps])
-    return Telling(title, episode, renditions(model, episode.x, xi, bad, episode.y), stride)
+    return ModelView(title, episode, reconstructions(model, episode.x, xi, bad, episode.y), stride)
 
 
-def strips(setup: Setup, shown: Telling, moments: Sequence[Moment], size: Size) -> Iterator[Picture]:
+def strips(setup: Setup, shown: ModelView, moments: Sequence[Moment], size: Size) -> Iterator[Picture]:
     """For every moment the pictures of original, reconstruction and generation side by side."""
     slow = replace(setup, control_step=setup.control_step * shown.stride)
     last = shown.told[0].xi.shape[1] - 1
@@ -80,9 +80,9 @@ def strips(setup: Setup, shown: Telling, moments: Sequence[Moment], size: Size) 
     for moment, original, *told in zip(moments, *columns, strict=True):
         seconds = (moment.step + 1) * setup.control_step
         note = badness_note(shown.episode.y)
-        panels = [captioned(original, f"original {seconds:.2f} s", note, moment.conditions)]
+        panels = [caption(original, f"original {seconds:.2f} s", note, moment.conditions)]
         for picture, rendition in zip(told, shown.told, strict=True):
-            panels.append(captioned(picture, rendition.name, badness_note(rendition.y), ()))
+            panels.append(caption(picture, rendition.name, badness_note(rendition.y), ()))
         yield mosaic(panels, len(panels))
 
 
@@ -90,7 +90,7 @@ def board(titles: Sequence[str], blocks: Sequence[Sequence[Picture]]) -> UInt8[n
     """Blocks of strips, each below its title and apart from the next, in rows of two."""
     margin = ((0, 0), (0, GAP), (0, 0))
     apart = [
-        np.pad(headed(mosaic(block, 1), title), margin, constant_values=255)
+        np.pad(add_title(mosaic(block, 1), title), margin, constant_values=255)
         for title, block in zip(titles, blocks, strict=True)
     ]
     return mosaic(apart, ACROSS)
@@ -114,22 +114,22 @@ def beside(
     """
     found = trained_model(folder, setup.name)
     try:
-        shown = telling(summary(setup, episode), episode, found.model, found.metadata["stride"])
+        shown = model_view(summary(setup, episode), episode, found.model, found.metadata["stride"])
     except ValueError as error:
         raise UserError(f"cannot use the model: {error}") from error
-    rows = _counted(strips(setup, shown, moments, size), len(moments))
+    rows = _with_progress(strips(setup, shown, moments, size), len(moments))
     blocks = iter([list(rows)]) if kind in STILLS else ([row] for row in rows)
     return (board([shown.title], [block]) for block in blocks)
 
 
-def _counted(rows: Iterator[Picture], count: int) -> Iterator[Picture]:
+def _with_progress(rows: Iterator[Picture], count: int) -> Iterator[Picture]:
     with ProgressLine("rows of pictures", count, 0) as progress:
         for row in rows:
             yield row
             progress.advance(1, "")
 
 
-def remarkable_motions(
+def write_remarkable(
     folder: Path, model: SvaeDc, dataset: Dataset, cache: TrainingCache, stride: int, count: int
 ) -> list[Path]:
     """A clip and stills of the best, the worst and two random held-out episodes, by objective.
@@ -148,13 +148,13 @@ def remarkable_motions(
     try:
         setup = setup_of(dataset.identity.setup, dataset.identity.bad_name)
         scenery_of(setup)
-        return motions(folder, _remarkable(dataset, cache, model, stride), setup, count)
+        return write_model_frames(folder, _remarkable(dataset, cache, model, stride), setup, count)
     except (UsageError, LookupError, ValueError) as error:
         say(f"no pictures of the model's motions: {error.args[0]}")
         return []
 
 
-def _remarkable(dataset: Dataset, cache: TrainingCache, model: SvaeDc, stride: int) -> list[Telling]:
+def _remarkable(dataset: Dataset, cache: TrainingCache, model: SvaeDc, stride: int) -> list[ModelView]:
     rows = cache.held_out()
     chosen = remarkable(np.asarray(cache.f[rows]), np.random.default_rng(0))
     indices = {name: int(cache.episode[rows[position]]) for name, position in chosen.items()}
@@ -162,11 +162,11 @@ def _remarkable(dataset: Dataset, cache: TrainingCache, model: SvaeDc, stride: i
     for name, index in indices.items():
         episode = dataset.episode(index)
         title = f"{name} of {len(rows)} held-out episodes: {index}, objective {episode.f:+.2f}"
-        tellings.append(telling(title, episode, model, stride))
+        tellings.append(model_view(title, episode, model, stride))
     return tellings
 
 
-def motions(folder: Path, tellings: Sequence[Telling], setup: Setup, count: int) -> list[Path]:
+def write_model_frames(folder: Path, tellings: Sequence[ModelView], setup: Setup, count: int) -> list[Path]:
     """Write `motions.gif` and, of its moments, `motions.png`.
 
     Args:

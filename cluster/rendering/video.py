@@ -14,7 +14,7 @@ Picture = UInt8[np.ndarray, "height width 3"]
 
 STILLS, CLIPS = (".png",), (".gif", ".mp4")
 PER_ROW = 3
-COLOURS = 64  # of a GIF; more cost space and are hardly seen
+COLORS = 64  # of a GIF; more cost space and are hardly seen
 HOLD = 1  # s that the last picture of a clip stays
 _SAMPLES = 16  # pictures that a GIF's colours are chosen from
 
@@ -77,7 +77,7 @@ def _write_gif(path: Path, pictures: Sequence[Picture], rate: int) -> None:
     """One palette for all pictures and no dithering, so that only what moves takes space."""
     chosen = np.linspace(0, len(pictures) - 1, min(_SAMPLES, len(pictures))).astype(int)
     sample = Image.fromarray(mosaic([pictures[number] for number in chosen], 4))
-    palette = sample.quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    palette = sample.quantize(COLORS, method=Image.Quantize.MEDIANCUT)
     first, *rest = (
         Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
     )

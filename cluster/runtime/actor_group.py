@@ -1,4 +1,4 @@
-"""A crew of Ray actors: each gets work only after its first answer, and is replaced when it is lost.
+"""A group of Ray actors: each gets work only after its first answer, and is replaced when it is lost.
 
 It may grow with the cluster: a place is added for a CPU that becomes free, and closed with its machine.
 """
@@ -19,14 +19,14 @@ from cluster.runtime.machines import free_cpus, is_there, machine_of, own_machin
 _RETRY_SECONDS = 2.0
 _LONGEST_RETRY_SECONDS = 60.0
 _LOOK_SECONDS = 5.0
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_COLOR = re.compile(r"\x1b\[[0-9;]*m")
 
 Item = TypeVar("Item")
 
 
 @dataclass(eq=False)
 class Member(Generic[Item]):
-    """A place in the crew, and the actor that fills it now.
+    """A place in the group, and the actor that fills it now.
 
     Attributes:
         actor: the actor's handle; None between a failed start and the next.
@@ -54,7 +54,7 @@ class Member(Generic[Item]):
         return self.actor is not None and self.starting is None
 
 
-class Crew(Generic[Item]):
+class ActorGroup(Generic[Item]):
     """Actors of one kind, each in its place.
 
     Args:
@@ -183,7 +183,7 @@ class Crew(Generic[Item]):
 
 def full_text(error: RayError) -> str:
     """All that Ray tells of an error, the traceback in the actor included."""
-    return _COLOUR.sub("", str(error)).strip()
+    return _COLOR.sub("", str(error)).strip()
 
 
 def in_one_line(error: RayError) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import ray
 from ray.exceptions import RayError, RayTaskError
 
-from cluster.runtime.actor_group import Crew, Member, full_text, in_one_line
+from cluster.runtime.actor_group import ActorGroup, Member, full_text, in_one_line
 
 MACHINES = 10
 """An item is given up after the loss of that many machines: it may be what brings them down."""
@@ -87,7 +87,7 @@ class Pool(Generic[Item, Result]):
     ) -> None:
         self._submit = submit
         self._limits = limits
-        self._crew: Crew[Item] = Crew(
+        self._actors: ActorGroup[Item] = ActorGroup(
             spawn=spawn, size=size, most=max(size, most), patience=limits.start_seconds
         )
         self._queue: deque[Item] = deque()
@@ -97,12 +97,12 @@ class Pool(Generic[Item, Result]):
     @property
     def answers(self) -> list[Any]:
         """What the actors' `ready` returned, those of actors that were replaced included."""
-        return self._crew.answers
+        return self._actors.answers
 
     @property
     def actor_seconds(self) -> float:
         """For how long there were actors, summed over them."""
-        return self._crew.seconds
+        return self._actors.seconds
 
     def __enter__(self) -> "Pool[Item, Result]":
         return self
@@ -110,7 +110,7 @@ class Pool(Generic[Item, Result]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._crew.dismiss()
+        self._actors.dismiss()
 
     def run(self, items: list[Item]) -> Iterator[Done[Item, Result] | Failed[Item]]:
         """Yield the outcome of every attempt, in the order they end.
@@ -119,35 +119,35 @@ class Pool(Generic[Item, Result]):
             UserError: actors cannot start, which is no fault of the items.
         """
         self._queue.extend(items)
-        while self._queue or any(member.tasks for member in self._crew.members):
-            self._crew.tend(len(self._queue))
+        while self._queue or any(member.tasks for member in self._actors.members):
+            self._actors.tend(len(self._queue))
             self._fill()
-            for outcome in [*self._finished(), *self._overdue()]:
+            for outcome in [*self._take_finished(), *self._overdue()]:
                 if isinstance(outcome, Failed) and outcome.attempts_left:
                     self._queue.append(outcome.item)
                 yield outcome
 
     def _fill(self) -> None:
-        for member in self._crew.members:
+        for member in self._actors.members:
             while member.is_ready and self._queue and len(member.tasks) < self._limits.in_flight:
                 item = self._queue.popleft()
                 if not member.tasks:
                     member.since = time.monotonic()
                 member.tasks[self._submit(member.actor, item)] = item
 
-    def _finished(self) -> Iterator[Done[Item, Result] | Failed[Item]]:
-        pending = self._crew.starting()
-        pending += [task for member in self._crew.members for task in member.tasks]
+    def _take_finished(self) -> Iterator[Done[Item, Result] | Failed[Item]]:
+        pending = self._actors.starting()
+        pending += [task for member in self._actors.members for task in member.tasks]
         if not pending:
             time.sleep(_POLL_SECONDS)
             return
         ready, _ = ray.wait(pending, num_returns=1, timeout=_POLL_SECONDS)
         for reference in ready:
-            for member in self._crew.members:
+            for member in self._actors.members:
                 if reference in member.tasks:
                     yield from self._outcomes(member, reference)
                 elif reference == member.starting:
-                    self._crew.welcome(member)
+                    self._actors.welcome(member)
 
     def _outcomes(self, member: Member[Item], task: Any) -> Iterator[Done[Item, Result] | Failed[Item]]:
         try:
@@ -155,7 +155,7 @@ class Pool(Generic[Item, Result]):
         except RayTaskError as error:
             item = self._take(member, task)
             self._attempts[item] += 1
-            yield self._failed(item, in_one_line(error), full_text(error), error.cause)
+            yield self._failure(item, in_one_line(error), full_text(error), error.cause)
         except RayError as error:  # its process or machine is gone, or was out of memory
             died = f"its worker process died: {in_one_line(error)}"
             yield from self._replace(member, died, full_text(error))
@@ -167,7 +167,7 @@ class Pool(Generic[Item, Result]):
         return member.tasks.pop(task)
 
     def _overdue(self) -> Iterator[Failed[Item]]:
-        for member in self._crew.members:
+        for member in self._actors.members:
             if not member.tasks or time.monotonic() - member.since <= self._limits.seconds:
                 continue
             done, _ = ray.wait(list(member.tasks), num_returns=1, timeout=0)
@@ -177,13 +177,13 @@ class Pool(Generic[Item, Result]):
 
     def _replace(self, member: Member[Item], error: str, text: str) -> Iterator[Failed[Item]]:
         """A new actor in the place of a lost one; only the item it was working on has failed."""
-        has_left = self._crew.has_left(member)
-        failed, *waiting = self._crew.replace(member)
+        has_left = self._actors.has_left(member)
+        failed, *waiting = self._actors.replace(member)
         self._queue.extendleft(reversed(waiting))
         (self._machines if has_left else self._attempts)[failed] += 1
-        yield self._failed(failed, f"its machine left: {error}" if has_left else error, text, None)
+        yield self._failure(failed, f"its machine left: {error}" if has_left else error, text, None)
 
-    def _failed(self, item: Item, error: str, text: str, cause: BaseException | None) -> Failed[Item]:
+    def _failure(self, item: Item, error: str, text: str, cause: BaseException | None) -> Failed[Item]:
         is_spent = self._machines[item] >= MACHINES
         left = 0 if is_spent else self._limits.attempts - self._attempts[item]
         return Failed(item, error, text, cause, left)

@@ -18,7 +18,7 @@ _POLL_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
-class Machine:
+class FreeNode:
     """What one machine has free."""
 
     cpus: int
@@ -48,11 +48,11 @@ class Placement:
         cpus = f"{self.cpus} CPUs" if self.cpus > 1 else "1 CPU"
         return f"{many}{fewer} of {cpus}{' and a GPU' if self.gpus else ''}"
 
-    def fits(self, machines: Sequence[Machine]) -> bool:
+    def fits(self, machines: Sequence[FreeNode]) -> bool:
         """Whether there is room for all of them."""
         return sum(self._room(machine) for machine in machines) >= self.processes
 
-    def _room(self, machine: Machine) -> int:
+    def _room(self, machine: FreeNode) -> int:
         by_cpus = machine.cpus // self.cpus
         return min(by_cpus, machine.gpus // self.gpus) if self.gpus else by_cpus
 
@@ -60,7 +60,7 @@ class Placement:
 def place(
     processes: int,
     cpus: int | Literal["all"],
-    machines: Sequence[Machine],
+    machines: Sequence[FreeNode],
     device: Literal["auto", "cpu", "cuda"] = "auto",
 ) -> Placement:
     """Decide the size of processes.
@@ -89,14 +89,14 @@ def place(
     return next(placement for placement in sizes if placement.fits(machines))
 
 
-def free_machines(session: Session) -> list[Machine]:
+def free_machines(session: Session) -> list[FreeNode]:
     """What every machine of the cluster has free, once what this command used before is free again."""
     if session.is_local:
-        return [Machine(session.cpus, session.gpus)]
+        return [FreeNode(session.cpus, session.gpus)]
     deadline = time.monotonic() + _PATIENCE_SECONDS
     while True:
         found = [
-            Machine(int(free.get("CPU", 0)), int(free.get("GPU", 0)))
+            FreeNode(int(free.get("CPU", 0)), int(free.get("GPU", 0)))
             for free in available_resources_per_node().values()
         ]
         if sum(machine.cpus for machine in found) >= session.cpus or time.monotonic() > deadline:
@@ -104,7 +104,7 @@ def free_machines(session: Session) -> list[Machine]:
         time.sleep(_POLL_SECONDS)
 
 
-def _no_room(wanted: Placement, machines: Sequence[Machine]) -> str:
+def _no_room(wanted: Placement, machines: Sequence[FreeNode]) -> str:
     total = wanted.processes * wanted.cpus
     gpus = f" and {wanted.processes} GPUs" if wanted.gpus else ""
     free = ", ".join(

@@ -121,14 +121,14 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
 def _start_parts(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster with these parts only."""
     if "dashboard" in parts:
-        _initialise(settings, include_dashboard=True)
+        _initialize(settings, include_dashboard=True)
         return
     with ray_internals.quiet_agent():
-        _initialise(settings, include_dashboard=False, _system_config=ray_internals.settings())
+        _initialize(settings, include_dashboard=False, _system_config=ray_internals.settings())
     ray_internals.end_spectators()
 
 
-def _initialise(settings: RaySettings, **more: Any) -> None:
+def _initialize(settings: RaySettings, **more: Any) -> None:
     """Starts Ray with the arguments that all clusters share, and those given."""
     ray.init(
         address="local",
@@ -148,7 +148,7 @@ def _join(settings: RaySettings, wanted: str) -> None:
     address = _on_this_machine(settings) if wanted == "auto" else wanted
     _knock(address, settings.connect_timeout_seconds)
     try:
-        if LOOPBACK in _admitted(address, settings.connect_timeout_seconds):
+        if LOOPBACK in _authenticate(address, settings.connect_timeout_seconds):
             _stay_on_loopback()
         ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
     except AuthenticationError as error:
@@ -192,7 +192,7 @@ def _parts(address: str) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
-def _admitted(address: str, patience: float) -> set[str]:
+def _authenticate(address: str, patience: float) -> set[str]:
     """Network addresses of the cluster's machines, from which on a token is used if the cluster wants one.
 
     One that wants none must not be shown any: this process would then demand it of the cluster, which takes

@@ -40,7 +40,7 @@ def explanation(error: TrainingFailedError, model: Path) -> str:
     """
     causes = _causes(error) or [error]
     if is_death(error):
-        told = _told(next(filter(_is_loss, causes), causes[0]))
+        told = _first_line(next(filter(_is_loss, causes), causes[0]))
         return (
             f"training processes keep dying, one of them with {told}; when that has an end, the same command "
             f"goes on from the last checkpoint in {model}"
@@ -54,7 +54,7 @@ def explanation(error: TrainingFailedError, model: Path) -> str:
             f"training stopped: {cause}; free some space and run the same command: it goes on from the last "
             f"checkpoint in {model}"
         )
-    return f"training failed: {_told(cause)}"
+    return f"training failed: {_first_line(cause)}"
 
 
 def _causes(error: TrainingFailedError) -> list[Exception]:
@@ -87,7 +87,7 @@ def _is_consequence(cause: Exception) -> bool:
     return _is_loss(cause) or isinstance(cause, (ConnectionError, DistError))
 
 
-def _told(cause: Exception) -> str:
+def _first_line(cause: Exception) -> str:
     """Its first line; a ValueError's is a sentence by itself, all others need their kind."""
     lines = str(cause).strip().splitlines()
     kind = type(cause).__name__

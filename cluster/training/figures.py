@@ -27,12 +27,12 @@ def latent_space(path: Path, model: SvaeDc, held_out: Episodes, f: Float[np.ndar
         held_out: episodes.
         f: their objective.
     """
-    chosen = _shown(held_out)
+    chosen = _positions(held_out)
     with torch.no_grad():
         tau, _ = model.latent_means(torch.from_numpy(held_out.x[held_out.rows[chosen]]))
-    centred = tau - tau.mean(0)
-    _, width, directions = torch.linalg.svd(centred, full_matrices=False)
-    points = (centred @ directions[:2].T).numpy()
+    centerd = tau - tau.mean(0)
+    _, width, directions = torch.linalg.svd(centerd, full_matrices=False)
+    points = (centerd @ directions[:2].T).numpy()
     share = (width[:2].square().sum() / width.square().sum()).item()
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     quantities = {"badness y": held_out.y[held_out.rows[chosen]], "objective f": f[chosen]}
@@ -42,12 +42,12 @@ def latent_space(path: Path, model: SvaeDc, held_out: Episodes, f: Float[np.ndar
         axes.set_xlabel("widest direction of E[tau|x]")
     figure.axes[0].set_ylabel("second widest")
     figure.suptitle(f"{len(chosen)} held-out controllers; two directions hold {share:.0%} of the variance")
-    return _written(figure, path)
+    return _save(figure, path)
 
 
 def badness(path: Path, model: SvaeDc, held_out: Episodes) -> Path:
     """Predicted against true badness of held-out episodes: from the trajectory, and from x alone."""
-    batch = held_out.gather(_shown(held_out), torch.device("cpu"))
+    batch = held_out.gather(_positions(held_out), torch.device("cpu"))
     with torch.no_grad():
         _, psi = model.split(model.posterior(batch.xi, batch.bad, batch.y).loc)
         predictions = {
@@ -61,7 +61,7 @@ def badness(path: Path, model: SvaeDc, held_out: Episodes) -> Path:
         _against(axes, batch.y.numpy(), y.numpy())
         axes.set_title(name)
     figure.axes[0].set_ylabel("badness y of the model")
-    return _written(figure, path)
+    return _save(figure, path)
 
 
 def _against(axes: Axes, truth: Float[np.ndarray, " n"], prediction: Float[np.ndarray, " n"]) -> None:
@@ -70,13 +70,13 @@ def _against(axes: Axes, truth: Float[np.ndarray, " n"], prediction: Float[np.nd
     axes.set_xlabel(f"true badness y (mean absolute error {np.abs(truth - prediction).mean():.2f})")
 
 
-def _shown(held_out: Episodes) -> Int64[np.ndarray, " shown"]:
+def _positions(held_out: Episodes) -> Int64[np.ndarray, " shown"]:
     """Positions spread evenly over the held-out episodes."""
     count = min(SHOWN, len(held_out))
     return np.linspace(0, len(held_out) - 1, count).astype(np.int64)
 
 
-def _written(figure: Figure, path: Path) -> Path:
+def _save(figure: Figure, path: Path) -> Path:
     with replacing(path) as unfinished:
         figure.savefig(unfinished, dpi=130)
     return path
@@ -126,6 +126,6 @@ def _moving_channels(held_out: Episodes, identity: Identity) -> list[int]:
 
 
 def _draw(axes: Axes, curves: Mapping[str, np.ndarray], identity: Identity) -> None:
-    for (name, values), colour in zip(curves.items(), ("#000000", "#0072b2", "#d55e00"), strict=True):
+    for (name, values), color in zip(curves.items(), ("#000000", "#0072b2", "#d55e00"), strict=True):
         seconds = np.linspace(0, identity.horizon * identity.control_step, len(values))
-        axes.plot(seconds, values, label=name, color=colour, linewidth=1.2)
+        axes.plot(seconds, values, label=name, color=color, linewidth=1.2)

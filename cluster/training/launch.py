@@ -17,7 +17,7 @@ from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
 from cluster.progress import ProgressLine, say
 from cluster.runtime.mailbox import mailbox
-from cluster.runtime.placement import Machine, Placement, place
+from cluster.runtime.placement import FreeNode, Placement, place
 from cluster.tracking import Run
 from cluster.training.failures import explanation, is_death
 from cluster.training.reports import Reports
@@ -29,7 +29,7 @@ _STARTS = 2
 """Starts of the processes that Ray Train tries anew; each waits a minute for its room."""
 
 
-def placed(settings: TrainSettings, machines: Sequence[Machine]) -> Placement:
+def placement_of(settings: TrainSettings, machines: Sequence[FreeNode]) -> Placement:
     """How many processes of which size train; fewer than asked for where that is allowed and room is scarce.
 
     Raises:
@@ -92,7 +92,7 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
         ),
     )
     try:
-        with interrupts_kept():
+        with keep_interrupts():
             trainer.fit()
     finally:
         shutil.rmtree(storage, ignore_errors=True)
@@ -104,7 +104,7 @@ def _workers(placement: Placement) -> Any:
 
 
 @contextmanager
-def interrupts_kept() -> Iterator[None]:
+def keep_interrupts() -> Iterator[None]:
     """Keeps the meaning of Ctrl-C in the main thread.
 
     Ray Train's handler for it exits, and stays for good. An exit here was that one or SIGTERM, which

@@ -9,7 +9,7 @@ from typing import Any
 from cluster.errors import UserError
 from cluster.files import read_json, write_json
 from cluster.progress import say
-from cluster.rendering.model_frames import remarkable_motions
+from cluster.rendering.model_frames import write_remarkable
 from cluster.tracking import Run, log_model
 from cluster.training import figures
 from cluster.training.worker import MODEL, TrainingJob, episodes
@@ -48,7 +48,7 @@ def record(
     collapsed = diagnostics.collapse(metrics) or ""
     pictures = _pictures(job, model, cache, dataset)
     if moments:
-        pictures += remarkable_motions(job.model, model, dataset, cache, job.stride, moments)
+        pictures += write_remarkable(job.model, model, dataset, cache, job.stride, moments)
     summary = {"metrics": metrics, "collapsed": collapsed, "episodes": len(cache.episode), **metadata}
     run.metrics({f"final/{name}": value for name, value in metrics.items()}, step=metadata["update"])
     for picture in pictures:
@@ -79,7 +79,7 @@ def _pictures(job: TrainingJob, model: SvaeDc, cache: TrainingCache, dataset: Da
     return pictures
 
 
-def recorded(folder: Path, update: int) -> dict[str, Any] | None:
+def read_record(folder: Path, update: int) -> dict[str, Any] | None:
     """The measures of the model in a folder if they were recorded after that many updates."""
     summary = read_json(folder / MEASURES)
     return summary if summary.get("update") == update else None

@@ -12,12 +12,12 @@ from ray.tune import RunConfig, TuneConfig, Tuner
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
 from cluster.files import replacing
-from cluster.progress import say, timed
+from cluster.progress import say, timing
 from cluster.runtime.session import Session
 from cluster.runtime.tune import silence_tune
 from cluster.tracking import Run, Tracker
-from cluster.training.sweep_worker import METHODS, RUNS, TRIALS, Point, run_point
-from cluster.training.train import begun, planned, trainable, working_in
+from cluster.training.sweep_worker import METHODS, RUNS, TRIALS, SweepPoint, run_point
+from cluster.training.train import plan_job, trainable, updates_so_far, working_in
 from svaedc.training.presets import usual_stride
 from workers.dataset.folder import Dataset
 from workers.dataset.storage.location import Location
@@ -68,7 +68,7 @@ def sweep(
         own = {"preset": preset, "seed": seed, "stride": settings.stride_or(usual_stride(preset))}
         with tracker.run(f"sweep {preset}", "sweep", {**settings.model_dump(mode="json"), **own}) as run:
             if missing:
-                with timed(f"training {len(missing)} models, {session.cpus} at a time"):
+                with timing(f"training {len(missing)} models, {session.cpus} at a time"):
                     _submit(missing, session.cpus)
             return _record(points, model, run)
 
@@ -121,21 +121,21 @@ def _plan(
     seed: int,
     settings: TrainSettings,
     changes: Mapping[str, Mapping[str, Any]],
-) -> list[Point]:
+) -> list[SweepPoint]:
     """Jobs whose folders fit, and whose caches exist, so that none decodes what another decodes too."""
     points = []
     with _refusals():
         for name, change in changes.items():
             varied = settings.model_copy(update={**change})
-            job = planned(dataset, model / "sweep" / name, preset, seed, varied)
+            job = plan_job(dataset, model / "sweep" / name, preset, seed, varied)
             training = job.settings(job.data()).training
-            points.append(Point(name, job, training.joint.updates + training.prior.updates))
+            points.append(SweepPoint(name, job, training.joint.updates + training.prior.updates))
             if not points[-1].result:
-                begun(job, training)
+                updates_so_far(job, training)
     return points
 
 
-def _submit(missing: Sequence[Point], slots: int) -> None:
+def _submit(missing: Sequence[SweepPoint], slots: int) -> None:
     silence_tune()
     with tempfile.TemporaryDirectory(prefix="svaedc-tune-") as storage:
         results = Tuner(
@@ -158,7 +158,7 @@ def _submit(missing: Sequence[Point], slots: int) -> None:
         )
 
 
-def _record(points: Sequence[Point], model: Path, run: Run) -> Path:
+def _record(points: Sequence[SweepPoint], model: Path, run: Run) -> Path:
     results = sorted((point.result for point in points), key=lambda each: -each["svae-dc"]["best"])
     path = model / TABLE
     with replacing(path) as unfinished:

@@ -8,7 +8,7 @@ from ray import tune
 
 from cluster.errors import UserError
 from cluster.files import read_json, write_json
-from cluster.training.worker import MODEL, TrainingJob, episodes, trained_alone
+from cluster.training.worker import MODEL, TrainingJob, episodes, train_alone
 from svaedc.bo.offline import Recorded, worth
 from svaedc.model import checkpoint, diagnostics
 from workers import setups
@@ -21,7 +21,7 @@ CANDIDATES = 2_000
 
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """A named point, its job, and the updates of its whole training."""
 
     name: str
@@ -51,14 +51,14 @@ class Point:
     def _identity(self) -> dict[str, Any]:
         return {"name": self.name, "origin": self.job.origin, "updates": self.updates}
 
-    def measured(self) -> dict[str, Any]:
+    def measure(self) -> dict[str, Any]:
         """The diagnostics of the point's model, which is trained first, and its worth for each of `METHODS`.
 
         Empty if its time limit ended the training: a point with fewer updates than the others tells nothing.
         """
         job = self.job
         job.model.mkdir(parents=True, exist_ok=True)
-        model = trained_alone(job).eval().requires_grad_(requires_grad=False)
+        model = train_alone(job).eval().requires_grad_(requires_grad=False)
         reached = checkpoint.load(job.model / MODEL)[1]["update"]
         if reached < self.updates:
             return {}
@@ -81,8 +81,8 @@ def run_point(config: dict[str, Any]) -> None:
         config: the `point`.
     """
     torch.set_num_threads(1)
-    point: Point = config["point"]
-    result = point.measured()
+    point: SweepPoint = config["point"]
+    result = point.measure()
     if result:
         write_json(point.job.model / RESULT, result)
     tune.report({"is_finished": bool(result)})

@@ -13,9 +13,9 @@ from cluster.progress import ProgressLine, say
 from cluster.runtime.placement import Placement, free_machines
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
-from cluster.training.launch import placed, submit
-from cluster.training.record import judge, record, recorded
-from cluster.training.worker import MODEL, STATE, TrainingJob, done, saved_state
+from cluster.training.launch import placement_of, submit
+from cluster.training.record import judge, read_record, record
+from cluster.training.worker import MODEL, STATE, TrainingJob, saved_state, updates_in
 from svaedc.model import checkpoint
 from svaedc.training.config import TrainingSettings
 from svaedc.training.loop import require_settings
@@ -68,11 +68,11 @@ def train(
     with _refusals(model):
         dataset = trainable(folder)
         with working_in(model):
-            job = planned(dataset, model, preset, seed, settings)
+            job = plan_job(dataset, model, preset, seed, settings)
             if not (model / MODEL).exists():
                 # Before the data is decoded, which may take an hour.
-                placed(settings, free_machines(session))
-            plan = _checked(job, dataset)
+                placement_of(settings, free_machines(session))
+            plan = _check(job, dataset)
             summary = _summary(plan, settings, session, tracker)
     judge(summary, plan.updates)
     return model / MODEL
@@ -81,11 +81,11 @@ def train(
 def _summary(plan: _Plan, settings: TrainSettings, session: Session, tracker: Tracker) -> dict[str, Any]:
     """What is recorded of the model; whatever is missing of it is made."""
     model, trained = plan.job.model, _trained_updates(plan)
-    summary = recorded(model, plan.updates) if trained == plan.updates else None
+    summary = read_record(model, plan.updates) if trained == plan.updates else None
     if summary is not None:
         say(f"{model / MODEL} is already trained: nothing to do")
         return summary
-    placement = placed(settings, free_machines(session)) if trained < plan.updates else None
+    placement = placement_of(settings, free_machines(session)) if trained < plan.updates else None
     with _run(plan, tracker, settings) as run:
         if placement is not None:
             _submit(plan, placement, run)
@@ -145,7 +145,7 @@ def working_in(model: Path) -> Iterator[None]:
         yield
 
 
-def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
+def plan_job(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
     """What the training processes get."""
     stride = settings.stride_or(usual_stride(preset))
     return TrainingJob(
@@ -174,14 +174,16 @@ def planned(dataset: Dataset, model: Path, preset: str, seed: int, settings: Tra
     )
 
 
-def _checked(job: TrainingJob, dataset: Dataset) -> _Plan:
+def _check(job: TrainingJob, dataset: Dataset) -> _Plan:
     """Refuses here whatever every training process would refuse, one after the other."""
     cache = job.data()
     training = job.settings(cache).training
-    return _Plan(job, dataset, cache, begun(job, training), training.joint.updates + training.prior.updates)
+    return _Plan(
+        job, dataset, cache, updates_so_far(job, training), training.joint.updates + training.prior.updates
+    )
 
 
-def begun(job: TrainingJob, training: TrainingSettings) -> int:
+def updates_so_far(job: TrainingJob, training: TrainingSettings) -> int:
     """Updates behind the checkpoint from which a job goes on; 0 without one.
 
     Raises:
@@ -195,7 +197,7 @@ def begun(job: TrainingJob, training: TrainingSettings) -> int:
         require_settings(state, training)
     except ValueError as error:
         raise UserError(f"{job.model / STATE}: {error}, in another --model folder") from error
-    return done(state, training)
+    return updates_in(state, training)
 
 
 def _trained_updates(plan: _Plan) -> int:

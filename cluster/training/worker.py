@@ -14,13 +14,13 @@ from ray.train.collective import broadcast_from_rank_zero
 from ray.train.torch import get_device, prepare_model
 
 from svaedc.data.episodes import Episodes, split
-from svaedc.data.samplers import Balanced, Order, Shard, uniform
+from svaedc.data.samplers import Balanced, Order, WorkerRank, uniform
 from svaedc.model import checkpoint
-from svaedc.model.svae_dc import SvaeDc, initialised
+from svaedc.model.svae_dc import SvaeDc, initialized_model
 from svaedc.training.config import TrainingSettings
-from svaedc.training.distributed import ALONE_AT_WORK, Workplace
+from svaedc.training.distributed import SINGLE_PROCESS, DistributedContext
 from svaedc.training.loop import EpochReport, fit
-from svaedc.training.presets import Preset, Sizes, preset, varied
+from svaedc.training.presets import Preset, Sizes, preset, vary
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
 from workers.dataset.storage.location import Location
@@ -90,7 +90,7 @@ class TrainingJob:
     def settings(self, cache: TrainingCache) -> Preset:
         """The preset for this data, with the job's seed and budget."""
         sizes = Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2])
-        made = varied(preset(self.preset)(sizes), self.changes)
+        made = vary(preset(self.preset)(sizes), self.changes)
         training = replace(made.training, seed=self.seed)
         if self.updates:
             training = training.with_updates(self.updates, self.updates if training.prior.updates else 0)
@@ -123,43 +123,43 @@ def run_worker(config: dict[str, Any]) -> None:
         config: the `job`, the `threads` of torch and the `mailbox` for reports.
     """
     torch.set_num_threads(config["threads"])
-    trained(config["job"], config["mailbox"])
+    train_together(config["job"], config["mailbox"])
 
 
-def trained(job: TrainingJob, mailbox: Any) -> SvaeDc:
+def train_together(job: TrainingJob, mailbox: Any) -> SvaeDc:
     """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
     device = get_device()
-    workplace = _workplace(job, device)
-    return _trained(
-        job, workplace, device, mailbox.put.remote, lambda update: ray.train.report({"update": update})
+    context = _context(job, device)
+    return _train(
+        job, context, device, mailbox.put.remote, lambda update: ray.train.report({"update": update})
     )
 
 
-def trained_alone(job: TrainingJob) -> SvaeDc:
+def train_alone(job: TrainingJob) -> SvaeDc:
     """The model, trained in this process without Ray Train; it goes on from a saved state all the same."""
-    return _trained(job, ALONE_AT_WORK, torch.device("cpu"), lambda _: None, lambda _: None)
+    return _train(job, SINGLE_PROCESS, torch.device("cpu"), lambda _: None, lambda _: None)
 
 
-def _trained(
+def _train(
     job: TrainingJob,
-    workplace: Workplace,
+    context: DistributedContext,
     device: torch.device,
     tell: Callable[[dict[str, Any]], object],
     end_epoch: Callable[[int], object],
 ) -> SvaeDc:
     begin = time.monotonic()
-    is_first = workplace.shard.rank == 0
+    is_first = context.shard.rank == 0
     cache = job.data()
     training, held_out = episodes(cache)
     settings = job.settings(cache)
-    model = initialised(settings.model, training, bounds(job.dataset), job.seed).to(device)
+    model = initialized_model(settings.model, training, bounds(job.dataset), job.seed).to(device)
     state = saved_state(job)
-    update = 0 if state is None else done(state, settings.training)
+    update = 0 if state is None else updates_in(state, settings.training)
     if is_first:
-        tell({"device": f"{_named(device)}, {workplace.precision}"})
+        tell({"device": f"{_device_name(device)}, {context.precision}"})
     mark, size = time.monotonic(), settings.training.batch_size
-    for report in fit(model, training, held_out, settings.training, state, job.order(cache), workplace):
-        late = workplace.agree(time.monotonic() - begin > job.time_limit)
+    for report in fit(model, training, held_out, settings.training, state, job.order(cache), context):
+        late = context.agree(time.monotonic() - begin > job.time_limit)
         if is_first:
             if late or report.is_last or report.epoch % job.checkpoint_every == 0:
                 checkpoint.write(job.model / STATE, {"origin": job.origin, "state": report.state})
@@ -174,7 +174,7 @@ def _trained(
     return model
 
 
-def done(state: dict[str, Any], settings: TrainingSettings) -> int:
+def updates_in(state: dict[str, Any], settings: TrainingSettings) -> int:
     """Updates behind a saved state, over both stages."""
     before = settings.joint.updates if state["stage"] == "prior" else 0
     stage = settings.prior if state["stage"] == "prior" else settings.joint
@@ -196,22 +196,22 @@ def saved_state(job: TrainingJob) -> dict[str, Any] | None:
     return content["state"]
 
 
-def _workplace(job: TrainingJob, device: torch.device) -> Workplace:
+def _context(job: TrainingJob, device: torch.device) -> DistributedContext:
     """This process among those of Ray Train."""
     context = ray.train.get_context()
     precision = job.precision
     if precision == "auto":
         has_bfloat16 = device.type == "cuda" and torch.cuda.is_bf16_supported(including_emulation=False)
         precision = "bfloat16" if has_bfloat16 else "float32"
-    return Workplace(
-        Shard(context.get_world_rank(), context.get_world_size()),
+    return DistributedContext(
+        WorkerRank(context.get_world_rank(), context.get_world_size()),
         prepare_model,
         broadcast_from_rank_zero,
         precision,
     )
 
 
-def _named(device: torch.device) -> str:
+def _device_name(device: torch.device) -> str:
     if device.type == "cuda":
         return f"{device} ({torch.cuda.get_device_name(device)})"
     return f"{device} ({torch.get_num_threads()} threads)"

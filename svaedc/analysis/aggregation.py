@@ -28,7 +28,7 @@ class _Runs:
         return np.fmax.accumulate(self.f, axis=1)
 
 
-def summarise(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generator) -> Summary:
+def summarize(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generator) -> Summary:
     """Means and Student-t intervals over runs, and paired differences with bootstrap intervals.
 
     The order of the rows does not matter. A run counts when it has as many trials as the longest.
@@ -122,7 +122,7 @@ def _differences(
     """A method against every other, its p values corrected together."""
     baselines = [name for name in complete if name != method]
     rngs = [np.random.default_rng([seed, *"\n".join(sorted((method, name))).encode()]) for name in baselines]
-    paired = [_paired(complete[method], complete[name], reporting) for name in baselines]
+    paired = [_paired_differences(complete[method], complete[name], reporting) for name in baselines]
     if not paired:
         return []
     p = holm(np.stack([sign_flip(values, rng) for values, rng in zip(paired, rngs, strict=True)]))
@@ -135,7 +135,9 @@ def _differences(
     ]
 
 
-def _paired(ours: _Runs, theirs: _Runs, reporting: Reporting) -> Float[np.ndarray, "runs columns"]:
+def _paired_differences(
+    ours: _Runs, theirs: _Runs, reporting: Reporting
+) -> Float[np.ndarray, "runs columns"]:
     """Differences of the shared runs: best so far at each trial, then the mean objective."""
     shared = sorted(set(ours.run) & set(theirs.run))
 

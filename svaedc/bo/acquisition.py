@@ -45,7 +45,7 @@ class Search(Protocol):
         """A controller for a trial before which nothing is known."""
         ...
 
-    def maximise(
+    def maximize(
         self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
         """The controller of largest value that is worth a trial."""
@@ -61,7 +61,7 @@ class OverPool:
         """A uniform draw from the candidates no trial was spent on."""
         return candidates.x[rng.choice(candidates.untried(history))].copy()
 
-    def maximise(
+    def maximize(
         self,
         value: Value,
         candidates: Candidates,
@@ -92,7 +92,7 @@ class ByGradient:
             first_allowed = candidates.excess(torch.tensor(x).double()).argmin()
         return x[first_allowed]
 
-    def maximise(
+    def maximize(
         self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
         """The controller of largest value, or a random one where that was tried already.

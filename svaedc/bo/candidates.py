@@ -58,7 +58,7 @@ class Problem:
 
     def known_latents(self) -> Latents:
         """The latents; without them, a `ValueError`."""
-        return _known(self.latents, "latents", "Latents.of(pool, model.latent_means)")
+        return _require(self.latents, "latents", "Latents.of(pool, model.latent_means)")
 
     def known_badness(self) -> Latents:
         """The latents of a model that predicts badness; without them, or with an SVAE's, a `ValueError`."""
@@ -72,11 +72,11 @@ class Problem:
 
     def known_densities(self) -> Densities:
         """The distributions; without them, a `ValueError`."""
-        return _known(self.densities, "densities", "Densities.of(model)")
+        return _require(self.densities, "densities", "Densities.of(model)")
 
     def known_adjustable(self) -> Adjustable:
         """The model; without one, a `ValueError`."""
-        return _known(self.adjustable, "adjustable layers", "Adjustable(model)")
+        return _require(self.adjustable, "adjustable layers", "Adjustable(model)")
 
     def least_bad(self, share: float) -> "Problem":
         """The same problem with only this share of the pool, the controllers predicted least bad."""
@@ -178,7 +178,7 @@ def by_density(problem: Problem, density: Density) -> Candidates:
     return Candidates.unscaled(problem, density.rows)
 
 
-def _known(part: Part | None, name: str, made_by: str) -> Part:
+def _require(part: Part | None, name: str, made_by: str) -> Part:
     if part is None:
         raise ValueError(f"{name} must be those of a trained model, got None: train one and pass {made_by}")
     return part

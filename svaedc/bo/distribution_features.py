@@ -22,8 +22,8 @@ def gaussian(p: Float[Tensor, "*p n dd"], q: Float[Tensor, "*q m dd"]) -> Float[
     """
     (mu_p, log_p), (mu_q, log_q) = p.chunk(2, dim=-1), q.chunk(2, dim=-1)
     # Locations around a common point: the products then cancel no digits that matter.
-    centre = mu_q.mean(dim=-2, keepdim=True)
-    mu_p, mu_q = mu_p - centre, mu_q - centre
+    center = mu_q.mean(dim=-2, keepdim=True)
+    mu_p, mu_q = mu_p - center, mu_q - center
     precision = torch.exp(-2 * log_q)
     second_moment = torch.exp(2 * log_p) + mu_p.square()
     quadratic = second_moment @ precision.mT - 2 * mu_p @ (mu_q * precision).mT
@@ -131,8 +131,8 @@ def _moments(model: Generative, x: Float[Tensor, "n D"]) -> Float[Tensor, "n row
     q = model.prior(x)
     (mean, _), (spread, _) = model.split(q.loc), model.split(q.variance.sqrt())
     decoded = [model.p_xi(mean + spread * corner) for corner in _corners(mean.shape[1]).to(mean)]
-    loc = torch.stack([_thinned(each.loc) for each in decoded])
-    variance = torch.stack([_thinned(each.variance) for each in decoded])
+    loc = torch.stack([_thin(each.loc) for each in decoded])
+    variance = torch.stack([_thin(each.variance) for each in decoded])
     total = variance.mean(dim=0) + loc.var(dim=0, correction=0)
     return torch.cat([loc.mean(dim=0), 0.5 * total.clamp_min(_LEAST_VARIANCE).log()], dim=-1)
 
@@ -146,6 +146,6 @@ def _corners(dimensions: int) -> Float[Tensor, "points dimensions"]:
     return torch.cat([signs, -signs]).float()
 
 
-def _thinned(xi: Float[Tensor, "n obs time"]) -> Float[Tensor, "n elements"]:
+def _thin(xi: Float[Tensor, "n obs time"]) -> Float[Tensor, "n elements"]:
     steps = torch.linspace(0, xi.shape[2] - 1, min(STEPS, xi.shape[2])).round().long()
     return xi[:, :, steps].double().flatten(1)

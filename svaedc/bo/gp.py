@@ -36,19 +36,19 @@ _log = logging.getLogger(__name__)
 
 
 @runtime_checkable
-class Surrogate(Protocol):
-    """A belief about f."""
+class Posterior(Protocol):
+    """What the trials say of f at any controller: mean and standard deviation."""
 
     def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
         """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
         ...
 
 
-Fit = Callable[[Tensor, Tensor], Surrogate]
+Fit = Callable[[Tensor, Tensor], Posterior]
 """From the features [n, k] and objectives [n] of the trials to what is expected elsewhere."""
 
 
-class Process:
+class GaussianProcess:
     r"""A fitted process: \mu = m + k^T K^{-1} (f - m), \sigma^2 = k_0 - k^T K^{-1} k, K with its noise.
 
     Each controller on its own, where BoTorch's posterior would predict them jointly, ten times slower.
@@ -82,7 +82,7 @@ class Process:
         return self._offset + self._unit * mu, self._unit * sigma
 
 
-def scaled(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
+def scale_objectives(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
     """Objectives with the setup's limits at 0 and 1.
 
     The limits are fixed per setup. Standardising by the few values of a run would make its first step depend
@@ -92,7 +92,7 @@ def scaled(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor,
     return (f - low) / (high - low)
 
 
-def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> Process:
+def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """Hyper-parameters of maximum marginal likelihood, and the process with them conditioned on all trials.
 
     Where a fit fails, the last good hyper-parameters serve: those fitted to the longest beginning of the
@@ -109,7 +109,7 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
     for count in range(len(f), 0, -1):
         fitted = _process(kernel(), phi[:count], f[:count])
         try:
-            _maximise_likelihood(fitted)
+            _maximize_likelihood(fitted)
         except (NanError, NotPSDError, ModelFittingError) as error:
             event = event or f"hyper-parameters not fitted to {count} trials, earlier ones serve: {error}"
             continue
@@ -117,7 +117,7 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
         break
     if event:
         _log.warning(event)
-    return Process(process, event)
+    return GaussianProcess(process, event)
 
 
 def _process(kernel: Kernel, phi: Tensor, f: Tensor) -> SingleTaskGP:
@@ -135,7 +135,7 @@ def _process(kernel: Kernel, phi: Tensor, f: Tensor) -> SingleTaskGP:
         )
 
 
-def _maximise_likelihood(model: SingleTaskGP) -> None:
+def _maximize_likelihood(model: SingleTaskGP) -> None:
     likelihood = ExactMarginalLogLikelihood(model.likelihood, model).train()
     with warnings.catch_warnings():
         # Reaching FIT_ITERATIONS is no failure: the likelihood of a few trials is flat long before.
@@ -148,22 +148,22 @@ def _maximise_likelihood(model: SingleTaskGP) -> None:
 _log = logging.getLogger(__name__)
 
 
-def default(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+def default(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """BoTorch's default process: SE with dimension-scaled priors (Hvarfner et al., ICML 2024)."""
-    return _fitted(SingleTaskGP, x, f)
+    return _fit(SingleTaskGP, x, f)
 
 
-def saas(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+def saas(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """A sum of Matern kernels under sparsity priors (Eriksson and Jankowiak, UAI 2021).
 
     BoTorch's maximum-a-posteriori form: its Markov chain Monte Carlo takes minutes for each trial.
     """
-    return _fitted(AdditiveMapSaasSingleTaskGP, x, f)
+    return _fit(AdditiveMapSaasSingleTaskGP, x, f)
 
 
-def turbo(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> Process:
+def turbo(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """The process of TuRBO's reference code: Matern-5/2 with bounded lengthscales and little noise."""
-    return _fitted(_matern_of_turbo, x, f)
+    return _fit(_matern_of_turbo, x, f)
 
 
 def _matern_of_turbo(x: Tensor, f: Tensor, outcome_transform: Standardize) -> SingleTaskGP:
@@ -178,9 +178,9 @@ def _matern_of_turbo(x: Tensor, f: Tensor, outcome_transform: Standardize) -> Si
     )
 
 
-def _fitted(build: Callable[..., SingleTaskGP], x: Tensor, f: Tensor) -> Process:
-    standardised = Standardize(m=1)
-    model, event = build(x, f[:, None], outcome_transform=standardised), ""
+def _fit(build: Callable[..., SingleTaskGP], x: Tensor, f: Tensor) -> GaussianProcess:
+    standardized = Standardize(m=1)
+    model, event = build(x, f[:, None], outcome_transform=standardized), ""
     try:
         with warnings.catch_warnings():
             # Of a fit that found no better hyper-parameters, as for equal outcomes.
@@ -189,4 +189,4 @@ def _fitted(build: Callable[..., SingleTaskGP], x: Tensor, f: Tensor) -> Process
     except ModelFittingError as error:
         event = f"hyper-parameters keep their starting values: {error}"
         _log.warning(event)
-    return Process(model, event, standardised.means.squeeze(), standardised.stdvs.squeeze())
+    return GaussianProcess(model, event, standardized.means.squeeze(), standardized.stdvs.squeeze())

@@ -25,7 +25,7 @@ def se(lengthscales: int) -> ScaleKernel:
     Args:
         lengthscales: 1 for one shared by all dimensions, or their number (ARD).
     """
-    return _scaled(RBFKernel(ard_num_dims=_ard(lengthscales), lengthscale_constraint=_lengthscale()))
+    return _scale(RBFKernel(ard_num_dims=_ard(lengthscales), lengthscale_constraint=_lengthscale()))
 
 
 def matern(lengthscales: int) -> ScaleKernel:
@@ -34,7 +34,7 @@ def matern(lengthscales: int) -> ScaleKernel:
     Args:
         lengthscales: 1 for one shared by all dimensions, or their number (ARD).
     """
-    return _scaled(
+    return _scale(
         MaternKernel(nu=2.5, ard_num_dims=_ard(lengthscales), lengthscale_constraint=_lengthscale())
     )
 
@@ -46,10 +46,10 @@ def kl(divergence: Divergence, median: float) -> ScaleKernel:
         divergence: KL of all pairs of rows.
         median: Of D over simulated controllers; alpha starts at its inverse.
     """
-    return _scaled(SymmetrisedKl(divergence, median))
+    return _scale(SymmetrizedKl(divergence, median))
 
 
-def compressed(outer: Kernel, embedding: Embedding) -> "Embedded":
+def compressed_kernel(outer: Kernel, embedding: Embedding) -> "Embedded":
     r"""k(x_i, x_j) = k_0(phi(x_i), phi(x_j)) with phi(x) = (1 - \bar y_x) \bar\tau_x, equation (k_svae_dc).
 
     The whole formula over rows [tau | y]. With a pool that does not change, phi is computed once instead, and
@@ -80,7 +80,7 @@ class Embedded(Kernel):
         return self.outer.forward(self.phi(x1), self.phi(x2), **params)
 
 
-class SymmetrisedKl(Kernel):
+class SymmetrizedKl(Kernel):
     r"""k(x_i, x_j) = exp(-\alpha D) with D = \sqrt{KL(p_i||p_j)} + \sqrt{KL(p_j||p_i)}, equation (BBK-KL).
 
     Its diagonal is 1. Between distributions of one common scale it is positive definite, but not in general:
@@ -131,7 +131,7 @@ def _positive_definite(likeness: Tensor) -> Tensor:
     return unit + (JITTER - smallest).clamp_min(0)[..., None, None] * identity
 
 
-def _scaled(kernel: Kernel) -> ScaleKernel:
+def _scale(kernel: Kernel) -> ScaleKernel:
     return ScaleKernel(kernel, outputscale_constraint=Interval(*OUTPUT_SCALE, initial_value=0.5))
 
 

@@ -87,18 +87,18 @@ def trials(
     Raises:
         ValueError: The earlier trials are not the beginning of this run.
     """
-    history, best = _resumed(initial, earlier)
+    history, best = _resume(initial, earlier)
     for index in range(len(earlier), len(initial) + count):
         start = clock()
         x = initial[index] if index < len(initial) else method.suggest(history, rng_for(index))
-        outcome = _measured(evaluate(x.copy()))
+        outcome = _finite_or_failed(evaluate(x.copy()))
         history = history.append(x, outcome.f)
         trial = _record(index, x, outcome, best, clock() - start)
         best = trial.best
         yield trial
 
 
-def _measured(outcome: Outcome) -> Outcome:
+def _finite_or_failed(outcome: Outcome) -> Outcome:
     return outcome if math.isfinite(outcome.f) else replace(outcome, f=math.nan)
 
 
@@ -117,7 +117,7 @@ def _record(index: int, x: Float32[np.ndarray, " D"], outcome: Outcome, best: fl
     )
 
 
-def _resumed(initial: Float32[np.ndarray, "i D"], earlier: Sequence[Trial]) -> tuple[History, float]:
+def _resume(initial: Float32[np.ndarray, "i D"], earlier: Sequence[Trial]) -> tuple[History, float]:
     history, best = History.empty(initial.shape[1]), math.nan
     for index, trial in enumerate(earlier):
         if trial.index != index:

@@ -21,9 +21,9 @@ from svaedc.bo.acquisition import (
     ucb,
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
-from svaedc.bo.gp import Process, Surrogate
+from svaedc.bo.gp import GaussianProcess, Posterior
 from svaedc.bo.history import History
-from svaedc.bo.surrogates import BELIEFS, BELIEFS_OF_A_MODEL, LEAST_BAD, Belief
+from svaedc.bo.surrogates import LATENT_SURROGATES, LEAST_BAD, SURROGATES, Surrogate
 from svaedc.bo.trust_region import TrustRegion
 
 
@@ -59,34 +59,34 @@ class PoolSearch:
 
 
 @dataclass(frozen=True)
-class Optimisation:
+class BayesianOptimization:
     """Bayesian optimisation.
 
     Attributes:
-        belief: What the trials teach about all controllers.
+        surrogate: What the trials teach about all controllers.
         acquisition: What makes a controller promising.
         search: Where the most promising one is sought.
     """
 
-    belief: Belief
+    surrogate: Surrogate
     acquisition: Acquisition
     search: Search
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
         """The controller of largest acquisition; before the first measurement, any."""
-        candidates = self.belief.candidates
+        candidates = self.surrogate.candidates
         if not len(history):
             return self.search.anywhere(candidates, history, rng)
         with torch_randomness(rng):
-            surrogate, best = self.belief.after(history)
-        return self.search.maximise(_value(surrogate, self.acquisition, best), candidates, history, rng)
+            posterior, best = self.surrogate.after(history)
+        return self.search.maximize(_value(posterior, self.acquisition, best), candidates, history, rng)
 
 
 @dataclass(frozen=True)
-class TrustRegionOptimisation:
+class TrustRegionOptimization:
     """TuRBO-1: Bayesian optimisation in a box around the best controller, which follows from the history."""
 
-    belief: Belief
+    surrogate: Surrogate
     acquisition: Acquisition
     search: Search
 
@@ -94,19 +94,19 @@ class TrustRegionOptimisation:
         """The controller of largest acquisition in the box; where a box begins, any."""
         region = TrustRegion.after(history.f.tolist(), history.x.shape[1])
         if region.begins:
-            return self.search.anywhere(self.belief.candidates, history, rng)
+            return self.search.anywhere(self.surrogate.candidates, history, rng)
         recent = History(history.x[region.first :], history.f[region.first :], history.failed)
         with torch_randomness(rng):
-            surrogate, best = self.belief.after(recent)
-        centre = torch.tensor(recent.x[recent.f.argmax()])
-        box = self.belief.candidates.within(*region.box(centre, _lengthscales(surrogate)))
-        return self.search.maximise(_value(surrogate, self.acquisition, best), box, history, rng)
+            posterior, best = self.surrogate.after(recent)
+        center = torch.tensor(recent.x[recent.f.argmax()])
+        box = self.surrogate.candidates.within(*region.box(center, _lengthscales(posterior)))
+        return self.search.maximize(_value(posterior, self.acquisition, best), box, history, rng)
 
 
 _SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
 _ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
 _OURS, _PRACTITIONERS = ("pool", "ucb"), ("acqf", "ei")
-_DEFAULTS: Final = {name: _OURS for name in BELIEFS | BELIEFS_OF_A_MODEL} | {
+_DEFAULTS: Final = {name: _OURS for name in SURROGATES | LATENT_SURROGATES} | {
     name: _PRACTITIONERS for name in ("botorch", "saasbo", "turbo")
 }
 _RANDOM: Final[dict[str, Callable[[Problem], Method]]] = {
@@ -158,7 +158,7 @@ def needs_model(name: str) -> bool:
         LookupError: There is no such method.
     """
     base = _Name.read(name).base
-    return base in BELIEFS_OF_A_MODEL or base == "screened-random"
+    return base in LATENT_SURROGATES or base == "screened-random"
 
 
 def build(name: str, problem: Problem) -> Method:
@@ -170,7 +170,7 @@ def build(name: str, problem: Problem) -> Method:
     """
     read = _Name.read(name)
     try:
-        return _RANDOM[name](problem) if name in _RANDOM else _optimisation(read, problem)
+        return _RANDOM[name](problem) if name in _RANDOM else _optimization(read, problem)
     except ValueError as error:
         raise ValueError(f"method {name!r}: {error}") from error
 
@@ -195,30 +195,32 @@ def _pool_of(method: Method) -> Candidates | None:
     match method:
         case PoolSearch(candidates):
             return candidates
-        case Optimisation(belief, _, OverPool()) | TrustRegionOptimisation(belief, _, OverPool()):
-            return belief.candidates
+        case BayesianOptimization(surrogate, _, OverPool()) | TrustRegionOptimization(
+            surrogate, _, OverPool()
+        ):
+            return surrogate.candidates
     return None
 
 
-def _optimisation(name: _Name, problem: Problem) -> Method:
+def _optimization(name: _Name, problem: Problem) -> Method:
     if name.search == "pool" and not len(problem.pool):
         raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
-    kind = TrustRegionOptimisation if name.base == "turbo" else Optimisation
-    belief = (BELIEFS | BELIEFS_OF_A_MODEL)[name.base](problem)
-    return kind(belief, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])
+    kind = TrustRegionOptimization if name.base == "turbo" else BayesianOptimization
+    surrogate = (SURROGATES | LATENT_SURROGATES)[name.base](problem)
+    return kind(surrogate, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])
 
 
-def _value(surrogate: Surrogate, acquisition: Acquisition, best: float) -> Value:
+def _value(posterior: Posterior, acquisition: Acquisition, best: float) -> Value:
     def value(phi: Tensor) -> Tensor:
-        return acquisition(*surrogate.moments(phi), best)
+        return acquisition(*posterior.moments(phi), best)
 
     return value
 
 
-def _lengthscales(surrogate: Surrogate) -> Tensor:
-    if not isinstance(surrogate, Process):
-        raise TypeError(f"a trust region needs a Process, got {type(surrogate).__name__}")
-    lengthscale: Tensor = surrogate.model.covar_module.base_kernel.lengthscale
+def _lengthscales(posterior: Posterior) -> Tensor:
+    if not isinstance(posterior, GaussianProcess):
+        raise TypeError(f"a trust region needs a GaussianProcess, got {type(posterior).__name__}")
+    lengthscale: Tensor = posterior.model.covar_module.base_kernel.lengthscale
     return lengthscale.flatten()
 
 

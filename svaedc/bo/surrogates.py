@@ -13,7 +13,7 @@ from svaedc.bo import gp, kernels
 from svaedc.bo.candidates import Candidates, Problem, as_they_are, by_density, by_latents, in_the_cube
 from svaedc.bo.distribution_features import Density
 from svaedc.bo.features import Sigmoid, Whitened, svae, svae_dc
-from svaedc.bo.gp import Fit, Surrogate, fit, scaled
+from svaedc.bo.gp import Fit, Posterior, fit, scale_objectives
 from svaedc.bo.history import History
 from svaedc.bo.online import AdjustedPaths
 
@@ -28,12 +28,12 @@ KernelOf = Callable[[int], Kernel]
 
 
 @dataclass(frozen=True)
-class Belief:
+class Surrogate:
     """How a method learns from trials.
 
     Attributes:
         candidates: What may be suggested, with the features that are compared.
-        fit: Turns features and objectives of the trials into a surrogate.
+        fit: Turns features and objectives of the trials into what they say of all controllers.
         limits: Objectives that count as 0 and 1.
     """
 
@@ -41,47 +41,47 @@ class Belief:
     fit: Fit
     limits: tuple[float, float]
 
-    def after(self, history: History) -> tuple[Surrogate, float]:
-        """The surrogate of a history that is not empty, and the largest objective in its units."""
-        f = scaled(torch.tensor(history.f), self.limits)
+    def after(self, history: History) -> tuple[Posterior, float]:
+        """What a history of at least one trial says of all controllers, and the largest objective in its units."""
+        f = scale_objectives(torch.tensor(history.f), self.limits)
         with torch.no_grad():
             phi = self.candidates.features_of(torch.tensor(history.x))
         return self.fit(phi, f), float(f.max())
 
 
-def on_controllers(kernel: KernelOf, problem: Problem) -> Belief:
+def on_controllers(kernel: KernelOf, problem: Problem) -> Surrogate:
     """k_0 on x, with a lengthscale for every controller parameter."""
-    return _kernel_belief(as_they_are(problem), partial(kernel, problem.dimensions), problem)
+    return _kernel_surrogate(as_they_are(problem), partial(kernel, problem.dimensions), problem)
 
 
-def on_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on \bar\tau, with a lengthscale for every latent dimension."""
     return _on_latents(svae, kernel, problem)
 
 
-def on_compressed_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_compressed_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on (1 - \bar y) \bar\tau, equation (k_svae_dc)."""
     problem.known_badness()
     return _on_latents(svae_dc, kernel, problem)
 
 
-def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau."""
     problem.known_badness()
     return _on_latents(Sigmoid(), kernel, problem)
 
 
-def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on (1 - \bar y) \bar\tau / s."""
     return _on_latents(Whitened.over(problem.known_badness().tau), kernel, problem)
 
 
-def on_screened_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_screened_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on \bar\tau, among the controllers predicted least bad."""
     return on_paths(kernel, problem.least_bad(LEAST_BAD))
 
 
-def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Belief:
+def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers."""
     problem.known_badness()
     start, adjustable = Sigmoid(), problem.known_adjustable()
@@ -90,49 +90,51 @@ def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Belief:
     def adjusted() -> Kernel:
         return kernels.Embedded(kernel(trained.phi.shape[1]), AdjustedPaths(adjustable, trained.unit, start))
 
-    return _kernel_belief(in_the_cube(problem), adjusted, problem)
+    return _kernel_surrogate(in_the_cube(problem), adjusted, problem)
 
 
-def on_trajectories(problem: Problem) -> Belief:
+def on_trajectories(problem: Problem) -> Surrogate:
     """BBK-KL: the symmetrised KL between p(xi|x_i) and p(xi|x_j)."""
     return _on_density(problem.known_densities().xi, problem)
 
 
-def on_latent_distributions(problem: Problem) -> Belief:
+def on_latent_distributions(problem: Problem) -> Surrogate:
     """LKL: the symmetrised KL between p(tau|x_i) and p(tau|x_j)."""
     return _on_density(problem.known_densities().tau, problem)
 
 
-def packaged(fit: Fit, problem: Problem) -> Belief:
+def packaged_gp(fit: Fit, problem: Problem) -> Surrogate:
     """A process of others on x, in the objective's own units, as they expect them."""
-    return Belief(in_the_cube(problem), fit, _AS_MEASURED)
+    return Surrogate(in_the_cube(problem), fit, _AS_MEASURED)
 
 
-def _on_latents(embedding: Callable[[Tensor, Tensor], Tensor], kernel: KernelOf, problem: Problem) -> Belief:
+def _on_latents(
+    embedding: Callable[[Tensor, Tensor], Tensor], kernel: KernelOf, problem: Problem
+) -> Surrogate:
     candidates = by_latents(problem, embedding)
-    return _kernel_belief(candidates, partial(kernel, candidates.phi.shape[1]), problem)
+    return _kernel_surrogate(candidates, partial(kernel, candidates.phi.shape[1]), problem)
 
 
-def _on_density(density: Density, problem: Problem) -> Belief:
+def _on_density(density: Density, problem: Problem) -> Surrogate:
     candidates = by_density(problem, density)
     some = candidates.phi[:_FOR_MEDIAN]
     median = float(kernels.distance(density.divergence, some, some).median()) if len(some) else 1.0
-    return _kernel_belief(candidates, partial(kernels.kl, density.divergence, median or 1.0), problem)
+    return _kernel_surrogate(candidates, partial(kernels.kl, density.divergence, median or 1.0), problem)
 
 
-def _kernel_belief(candidates: Candidates, kernel: Callable[[], Kernel], problem: Problem) -> Belief:
-    return Belief(candidates, partial(fit, kernel), problem.objective_limits)
+def _kernel_surrogate(candidates: Candidates, kernel: Callable[[], Kernel], problem: Problem) -> Surrogate:
+    return Surrogate(candidates, partial(fit, kernel), problem.objective_limits)
 
 
-BELIEFS: Final[dict[str, Callable[[Problem], Belief]]] = {
+SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "se": partial(on_controllers, kernels.se),
     "matern": partial(on_controllers, kernels.matern),
-    "botorch": partial(packaged, gp.default),
-    "saasbo": partial(packaged, gp.saas),
-    "turbo": partial(packaged, gp.turbo),
+    "botorch": partial(packaged_gp, gp.default),
+    "saasbo": partial(packaged_gp, gp.saas),
+    "turbo": partial(packaged_gp, gp.turbo),
 }
 
-BELIEFS_OF_A_MODEL: Final[dict[str, Callable[[Problem], Belief]]] = {
+LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "svae": partial(on_paths, kernels.se),
     "svae-matern": partial(on_paths, kernels.matern),
     "svae-dc": partial(on_compressed_paths, kernels.se),

@@ -66,19 +66,19 @@ class TrustRegion:
         if self.begins:
             return counted
         if f > self.best + _LEAST_GAIN * abs(self.best):
-            return replace(counted, successes=self.successes + 1, failures=0)._resized()
-        return replace(counted, successes=0, failures=self.failures + 1)._resized()
+            return replace(counted, successes=self.successes + 1, failures=0)._resize()
+        return replace(counted, successes=0, failures=self.failures + 1)._resize()
 
     def box(
-        self, centre: Float[Tensor, " D"], lengthscales: Float[Tensor, " D"]
+        self, center: Float[Tensor, " D"], lengthscales: Float[Tensor, " D"]
     ) -> tuple[Float[Tensor, " D"], Float[Tensor, " D"]]:
         """Lower and upper corner, within the unit cube: longer where f changes slowly, of the same volume."""
         weights = lengthscales / torch.exp(lengthscales.log().mean())
-        return (centre - weights * self.length / 2).clamp(0, 1), (centre + weights * self.length / 2).clamp(
+        return (center - weights * self.length / 2).clamp(0, 1), (center + weights * self.length / 2).clamp(
             0, 1
         )
 
-    def _resized(self) -> "TrustRegion":
+    def _resize(self) -> "TrustRegion":
         if self.successes >= SUCCESSES:
             return replace(self, length=min(2 * self.length, LARGEST_LENGTH), successes=0)
         if self.failures < self.failures_allowed:

@@ -37,7 +37,7 @@ def save(path: Path, model: SvaeDc, metadata: dict[str, Any]) -> None:
     )
 
 
-def located(path: Path) -> Path:
+def checkpoint_path(path: Path) -> Path:
     """The checkpoint that a user names by itself or by its folder."""
     return path / FILE if path.is_dir() else path
 

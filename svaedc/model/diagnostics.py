@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from svaedc.data.episodes import Batch, Episodes, measured_over
+from svaedc.data.episodes import Batch, Episodes, measure_batches
 from svaedc.model.svae_dc import SvaeDc
 
 _MEANS: Final = ("log_p_xi", "log_p_y", "minus_log_q", "kl", "log_p_xi_from_x", "log_p_y_from_x")
@@ -55,7 +55,7 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
     # A fixed seed makes the draw of q the same in every evaluation and leaves the caller's generator alone.
     with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         torch.manual_seed(0)
-        found = measured_over(episodes, device, partial(_measured, model))
+        found = measure_batches(episodes, device, partial(_measure, model))
     model.train(was_training)
     return _summary({name: values.cpu().double() for name, values in found.items()})
 
@@ -84,7 +84,7 @@ def collapse(metrics: dict[str, float]) -> str | None:
     return None
 
 
-def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *rest"]]:
+def _measure(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *rest"]]:
     """Per-episode quantities that the summary averages."""
     terms = model(*batch)
     q, p = model.posterior(batch.xi, batch.bad, batch.y), model.prior(batch.x)
@@ -98,8 +98,8 @@ def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *re
         "log_p_xi_from_x": log_p_xi_from_x,
         "log_p_y_from_x": log_p_y_from_x,
         "y": batch.y,
-        "y_rec": _predicted(model, q_psi),
-        "y_gen": _predicted(model, p_psi),
+        "y_rec": _predict(model, q_psi),
+        "y_gen": _predict(model, p_psi),
         "minus_log_q": q.entropy(),
         "q_tau": q_tau,
         "q_tau_variance": model.split(q.variance)[0],
@@ -108,7 +108,7 @@ def _measured(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *re
     }
 
 
-def _predicted(model: SvaeDc, psi: Float[Tensor, "batch psi"]) -> Float[Tensor, " batch"]:
+def _predict(model: SvaeDc, psi: Float[Tensor, "batch psi"]) -> Float[Tensor, " batch"]:
     return model.p_y(psi).loc if model.config.has_psi else psi.new_full((len(psi),), torch.nan)
 
 

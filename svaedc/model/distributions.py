@@ -55,7 +55,7 @@ class Diagonal(ABC):
         """Entropy of one element of the standard distribution."""
 
     @abstractmethod
-    def _log_density(self, standardised: Tensor) -> Tensor:
+    def _log_density(self, standardized: Tensor) -> Tensor:
         """Log density of the standard distribution (loc 0, scale 1)."""
 
     @abstractmethod
@@ -85,8 +85,8 @@ class DiagonalLaplace(Diagonal):
     def _standard_entropy(self) -> float:
         return 1.0 + math.log(2.0)
 
-    def _log_density(self, standardised: Tensor) -> Tensor:
-        return -standardised.abs() - math.log(2.0)
+    def _log_density(self, standardized: Tensor) -> Tensor:
+        return -standardized.abs() - math.log(2.0)
 
     def _standard_noise(self) -> Tensor:
         # The interval is open at -1: log1p(-1) would be an infinite sample.
@@ -116,8 +116,8 @@ class DiagonalGaussian(Diagonal):
     def _standard_entropy(self) -> float:
         return 0.5 * math.log(2.0 * math.pi * math.e)
 
-    def _log_density(self, standardised: Tensor) -> Tensor:
-        return -0.5 * standardised.square() - 0.5 * math.log(2.0 * math.pi)
+    def _log_density(self, standardized: Tensor) -> Tensor:
+        return -0.5 * standardized.square() - 0.5 * math.log(2.0 * math.pi)
 
     def _standard_noise(self) -> Tensor:
         return torch.randn_like(self.loc)

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from svaedc.model.config import KERNEL, STRIDE, ModelConfig, decoded_length, encoded_length
 from svaedc.model.distributions import FAMILIES, Diagonal, bounded_scale, full_precision
-from svaedc.model.normalizer import Statistics
+from svaedc.model.normalizer import TrainingStatistics
 
 
 def convolutions(channels: Sequence[int]) -> nn.Sequential:
@@ -181,7 +181,7 @@ class DenseHead(nn.Module):
         self.family = FAMILIES[config.distribution]
         self.bounds = config.observation_scale
 
-    def adopt(self, statistics: Statistics) -> None:
+    def adopt(self, statistics: TrainingStatistics) -> None:
         """Ignore the statistics: the paper's head starts from random weights."""
 
     def forward(self, tau: Float[Tensor, "batch tau"]) -> Diagonal:
@@ -217,7 +217,7 @@ class LowRankHead(nn.Module):
         self.family = FAMILIES[config.distribution]
         self.bounds = config.observation_scale
 
-    def adopt(self, statistics: Statistics) -> None:
+    def adopt(self, statistics: TrainingStatistics) -> None:
         """Start from the median trajectory and the principal directions around it."""
         with torch.no_grad():
             self.median.copy_(torch.from_numpy(statistics.median))

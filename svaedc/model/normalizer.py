@@ -14,7 +14,7 @@ SPREAD_FLOOR: Final = 1e-4
 
 
 @dataclass(frozen=True)
-class Statistics:
+class TrainingStatistics:
     """What a dataset's trajectories look like, measured on training episodes only.
 
     Attributes:
@@ -38,7 +38,7 @@ def measure(
     bounds: tuple[Sequence[float], Sequence[float]],
     rank: int,
     rng: np.random.Generator,
-) -> Statistics:
+) -> TrainingStatistics:
     """Statistics of trajectories that fit into memory a few times over.
 
     Args:
@@ -62,7 +62,7 @@ def measure(
     residuals = scaled - median
     spread = np.maximum(np.abs(residuals).mean(axis=(0, 2)), SPREAD_FLOOR)
     directions = _principal_directions((residuals / spread[:, None]).reshape(len(xi), -1), rank, rng)
-    return Statistics(low, high, median, spread, directions.reshape(rank, *median.shape))
+    return TrainingStatistics(low, high, median, spread, directions.reshape(rank, *median.shape))
 
 
 def _principal_directions(
@@ -80,7 +80,7 @@ def _principal_directions(
 
 
 @final
-class Normaliser(nn.Module):
+class Normalizer(nn.Module):
     """Trajectories in SI units to [0, 1] and back, and the median that errors are measured against.
 
     All are buffers, so a checkpoint explains itself.
@@ -99,7 +99,7 @@ class Normaliser(nn.Module):
         self.register_buffer("median", torch.full((observation_dim, time_steps), 0.5))
         self.register_buffer("spread", torch.full((observation_dim, 1), 0.25))
 
-    def adopt(self, statistics: Statistics) -> None:
+    def adopt(self, statistics: TrainingStatistics) -> None:
         """Copy measured statistics into the buffers."""
         self.low.copy_(torch.from_numpy(statistics.low).unsqueeze(1))
         self.high.copy_(torch.from_numpy(statistics.high).unsqueeze(1))
@@ -119,5 +119,5 @@ class Normaliser(nn.Module):
         return xi * (self.high - self.low) + self.low
 
 
-POSTERIOR_INPUTS: Final = {"scaled": Normaliser.scaled, "residual": Normaliser.residual}
+POSTERIOR_INPUTS: Final = {"scaled": Normalizer.scaled, "residual": Normalizer.residual}
 """What q sees of a trajectory; residuals cut the held-out reconstruction error by a fifth."""

@@ -15,7 +15,7 @@ RANDOM: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Rendition:
+class Reconstruction:
     """One way to tell an episode.
 
     Attributes:
@@ -29,13 +29,13 @@ class Rendition:
     y: float
 
 
-def renditions(
+def reconstructions(
     model: SvaeDc,
     x: Float32[np.ndarray, " controller"],
     xi: Float32[np.ndarray, "obs time"],
     bad: Float32[np.ndarray, " time"],
     y: float,
-) -> tuple[Rendition, Rendition]:
+) -> tuple[Reconstruction, Reconstruction]:
     """An episode decoded from the mean of q(tau|xi, y), and from that of p(tau|x).
 
     Args:
@@ -51,13 +51,13 @@ def renditions(
             "reconstructed": model.posterior(one.xi, one.bad, one.y).loc,
             "generated": model.prior(one.x).loc,
         }
-        first, second = (_told(model, name, *model.split(code)) for name, code in codes.items())
+        first, second = (_decode(model, name, *model.split(code)) for name, code in codes.items())
     return first, second
 
 
-def _told(model: SvaeDc, name: str, tau: torch.Tensor, psi: torch.Tensor) -> Rendition:
+def _decode(model: SvaeDc, name: str, tau: torch.Tensor, psi: torch.Tensor) -> Reconstruction:
     y = float(model.badness_at(psi)) if model.config.has_psi else float("nan")
-    return Rendition(name, model.normaliser.unscaled(model.p_xi(tau).loc)[0].numpy(), y)
+    return Reconstruction(name, model.normaliser.unscaled(model.p_xi(tau).loc)[0].numpy(), y)
 
 
 def remarkable(f: Float[np.ndarray, " episodes"], rng: np.random.Generator) -> dict[str, int]:

@@ -12,7 +12,7 @@ from svaedc.data.episodes import Episodes
 from svaedc.model.config import ModelConfig
 from svaedc.model.distributions import Diagonal, kl_divergence
 from svaedc.model.networks import HEADS, PRIORS, Badness, DenseHead, Encoder, LowRankHead
-from svaedc.model.normalizer import POSTERIOR_INPUTS, Normaliser, measure
+from svaedc.model.normalizer import POSTERIOR_INPUTS, Normalizer, measure
 
 STATISTICS_SAMPLE: Final = 2_000
 """Trajectories that the decoder's starting point is measured on; more change it by less than one percent."""
@@ -47,7 +47,7 @@ class SvaeDc(nn.Module):
         """Build untrained networks; `initialised` also measures the data they start from."""
         super().__init__()
         self.config = config
-        self.normaliser = Normaliser(config.observation_dim, config.time_steps)
+        self.normaliser = Normalizer(config.observation_dim, config.time_steps)
         self.posterior_network = Encoder(config)
         self.prior_network = PRIORS[config.prior](config)
         self.decoder: DenseHead | LowRankHead = HEADS[config.head](config)
@@ -152,7 +152,7 @@ class SvaeDc(nn.Module):
         return self.normaliser.unscaled(self.p_xi(tau).loc)
 
 
-def initialised(
+def initialized_model(
     config: ModelConfig, training: Episodes, bounds: tuple[Sequence[float], Sequence[float]], seed: int
 ) -> SvaeDc:
     """Untrained model whose buffers and decoder start from the training trajectories.

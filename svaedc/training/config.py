@@ -84,7 +84,7 @@ class StageSettings:
 
     def __post_init__(self) -> None:
         """Refuse unknown names and values outside their ranges."""
-        for name, allowed in (("optimiser", OPTIMISERS), ("schedule", SCHEDULES)):
+        for name, allowed in (("optimiser", OPTIMIZERS), ("schedule", SCHEDULES)):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
         if self.updates < 0 or self.learning_rate <= 0.0 or self.weight_decay < 0.0:
@@ -143,9 +143,9 @@ class TrainingSettings:
         return asdict(self)
 
 
-def optimiser_of(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
+def optimizer_of(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
     """New optimiser over the parameters of `module`."""
-    return OPTIMISERS[settings.optimiser](module, settings)
+    return OPTIMIZERS[settings.optimiser](module, settings)
 
 
 def _adam(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
@@ -165,5 +165,5 @@ def _halving(settings: StageSettings, update: int) -> float:
     return max(settings.learning_rate * 0.5 ** (update // 5_000), min(1e-5, settings.learning_rate))
 
 
-OPTIMISERS: Final = {"adam": _adam, "rmsprop": _rmsprop}
+OPTIMIZERS: Final = {"adam": _adam, "rmsprop": _rmsprop}
 SCHEDULES: Final = {"cosine": _cosine, "halving": _halving}

@@ -8,25 +8,25 @@ from typing import Final
 import torch
 from torch import nn
 
-from svaedc.data.samplers import ALONE, Shard
+from svaedc.data.samplers import ALONE, WorkerRank
 
 PRECISIONS: Final = {"float32": torch.float32, "bfloat16": torch.bfloat16}
 """Of matrix products and convolutions. Weights, densities and sums are float32 in either, and bfloat16 has
 float32's range, so that no loss needs scaling."""
 
 
-def unchanged(module: nn.Module) -> nn.Module:
+def same_module(module: nn.Module) -> nn.Module:
     """The module itself: nobody shares the work."""
     return module
 
 
-def own(decision: bool) -> bool:  # noqa: FBT001
+def same_decision(decision: bool) -> bool:  # noqa: FBT001
     """The decision itself: nobody else has one."""
     return decision
 
 
 @dataclass(frozen=True)
-class Workplace:
+class DistributedContext:
     """What a training process must know of its surroundings; nothing here changes what is learnt but noise.
 
     Attributes:
@@ -36,9 +36,9 @@ class Workplace:
         precision: `float32`, or `bfloat16` for mixed precision, which pays on a GPU.
     """
 
-    shard: Shard = ALONE
-    parallelise: Callable[[nn.Module], nn.Module] = unchanged
-    agree: Callable[[bool], bool] = own
+    shard: WorkerRank = ALONE
+    parallelize: Callable[[nn.Module], nn.Module] = same_module
+    agree: Callable[[bool], bool] = same_decision
     precision: str = "float32"
 
     def __post_init__(self) -> None:
@@ -52,4 +52,4 @@ class Workplace:
         return torch.autocast(device.type, PRECISIONS[self.precision], enabled=is_mixed)
 
 
-ALONE_AT_WORK: Final = Workplace()
+SINGLE_PROCESS: Final = DistributedContext()

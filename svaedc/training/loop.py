@@ -15,8 +15,8 @@ from svaedc.data.episodes import Episodes
 from svaedc.data.samplers import Order, batches, uniform
 from svaedc.model.diagnostics import evaluate
 from svaedc.model.svae_dc import SvaeDc
-from svaedc.training.config import TrainingSettings, optimiser_of
-from svaedc.training.distributed import ALONE_AT_WORK, Workplace
+from svaedc.training.config import TrainingSettings, optimizer_of
+from svaedc.training.distributed import SINGLE_PROCESS, DistributedContext
 from svaedc.training.objectives import JointStage, PriorStage, Stage
 
 TrainingState = dict[str, Any]
@@ -52,7 +52,7 @@ class EpochReport:
 
 
 @dataclass(frozen=True)
-class Run:
+class TrainingRun:
     """One training run: what its stages have in common."""
 
     model: SvaeDc
@@ -60,7 +60,7 @@ class Run:
     held_out: Episodes
     settings: TrainingSettings
     order: Order
-    workplace: Workplace
+    context: DistributedContext
 
     def load(self, state: TrainingState) -> None:
         """Put saved weights into the model."""
@@ -82,17 +82,17 @@ class Run:
 class Loop:
     """One stage's optimiser and its epochs."""
 
-    def __init__(self, run: Run, stage: Stage, wrapped: nn.Module) -> None:
+    def __init__(self, run: TrainingRun, stage: Stage, wrapped: nn.Module) -> None:
         """Optimise `stage` through `wrapped`."""
         self._run, self._stage, self._wrapped = run, stage, wrapped
-        self._optimiser = optimiser_of(stage.module, stage.settings)
+        self._optimizer = optimizer_of(stage.module, stage.settings)
         self._device = next(stage.module.parameters()).device
         rng = np.random.default_rng(run.settings.seed)
         self._measured_on = run.held_out.sample(run.settings.held_out_sample, rng)
 
     def load(self, state: TrainingState) -> None:
         """Go on from a saved state of this stage."""
-        self._optimiser.load_state_dict(state["optimiser"])
+        self._optimizer.load_state_dict(state["optimiser"])
         self._stage.memory = state["memory"]
 
     def epochs(self, done: int) -> Iterator[EpochReport]:
@@ -105,7 +105,7 @@ class Loop:
             metrics = self._epoch(epoch, updates)
             held_out = evaluate(self._run.model, self._measured_on)
             best = self._stage.end_epoch(held_out)
-            is_over = updates.stop == total or self._run.workplace.agree(self._stage.is_stale)
+            is_over = updates.stop == total or self._run.context.agree(self._stage.is_stale)
             if is_over:
                 self._stage.finish()
             if is_over and self._stage.keeps_best:
@@ -124,7 +124,7 @@ class Loop:
         self._stage.begin_epoch()
         sums: dict[str, Tensor] = {}
         with torch.random.fork_rng(devices=devices):
-            shard = run.workplace.shard
+            shard = run.context.shard
             entropy = np.random.SeedSequence((*seed, epoch, shard.rank))
             torch.manual_seed(int(entropy.generate_state(1)[0]))
             size = run.settings.batch_size
@@ -142,15 +142,15 @@ class Loop:
 
     def _update(self, update: int, positions: Integer[np.ndarray, " batch"]) -> dict[str, Tensor]:
         settings = self._stage.settings
-        for group in self._optimiser.param_groups:
+        for group in self._optimizer.param_groups:
             group["lr"] = settings.learning_rate_at(update)
         self._stage.progress = update / settings.updates
-        with self._run.workplace.autocast(self._device):
+        with self._run.context.autocast(self._device):
             loss, terms = self._stage.loss(self._wrapped, positions)
-        self._optimiser.zero_grad()
+        self._optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._stage.module.parameters(), settings.gradient_norm)
-        self._optimiser.step()
+        self._optimizer.step()
         return {"loss": loss.detach()} | {name: value.detach() for name, value in terms.items()}
 
     def _report(self, epoch: int, done: int, metrics: dict[str, float]) -> EpochReport:
@@ -169,7 +169,7 @@ class Loop:
                     "is_over": done == stage.settings.updates,
                     "settings": run.settings.to_dict(),
                     "model": run.model.state_dict(),
-                    "optimiser": self._optimiser.state_dict(),
+                    "optimiser": self._optimizer.state_dict(),
                     "memory": stage.memory,
                 }
             ),
@@ -209,7 +209,7 @@ def fit(
     settings: TrainingSettings,
     resume: TrainingState | None = None,
     order: Order = uniform,
-    workplace: Workplace = ALONE_AT_WORK,
+    context: DistributedContext = SINGLE_PROCESS,
 ) -> Iterator[EpochReport]:
     """Train `model` in place, on the device of its parameters, and report after every epoch.
 
@@ -218,24 +218,24 @@ def fit(
 
     Args:
         model: From `initialised`.
-        training: All workers' training episodes; the workplace's shard selects this worker's.
+        training: All workers' training episodes; the context's shard selects this worker's.
         held_out: Measured after every epoch; they also select stage two's network.
         settings: The run.
         resume: `EpochReport.state` of an earlier run with the same settings, or None for a new run. A
             finished run yields nothing more.
         order: Of the training episodes in each pass.
-        workplace: Who trains with this process, and in which precision.
+        context: Who trains with this process, and in which precision.
 
     Raises:
         ValueError: `resume` comes from other settings, or there are too few episodes.
         FloatingPointError: The loss is no longer finite.
     """
-    run = Run(model, training, held_out, settings, order, workplace)
+    run = TrainingRun(model, training, held_out, settings, order, context)
     if resume is not None:
         run.load(resume)
-    for name in _left(settings, resume):
+    for name in _stages_left(settings, resume):
         stage = run.stage(name)
-        loop = Loop(run, stage, workplace.parallelise(stage.module))
+        loop = Loop(run, stage, context.parallelize(stage.module))
         done = 0
         if resume is not None and resume["stage"] == name:
             loop.load(resume)
@@ -243,7 +243,7 @@ def fit(
         yield from loop.epochs(done)
 
 
-def _left(settings: TrainingSettings, resume: TrainingState | None) -> list[str]:
+def _stages_left(settings: TrainingSettings, resume: TrainingState | None) -> list[str]:
     """Stages with a budget that are not over, in order."""
     first = 0
     if resume is not None:

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float, Integer
 from torch import Tensor, nn
 
-from svaedc.data.episodes import Batch, Episodes, measured_over
+from svaedc.data.episodes import Batch, Episodes, measure_batches
 from svaedc.model.distributions import FAMILIES, Diagonal, kl_divergence
 from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.config import StageSettings, TrainingSettings, Weighting
@@ -233,5 +233,5 @@ def posteriors(model: SvaeDc, episodes: Episodes) -> Diagonal:
         return {"loc": q.loc, "scale": q.scale}
 
     model.eval()
-    found = measured_over(episodes, next(model.parameters()).device, encoded)
+    found = measure_batches(episodes, next(model.parameters()).device, encoded)
     return FAMILIES[model.config.distribution](found["loc"], found["scale"])

@@ -120,7 +120,7 @@ LATENT_SIZES: Final = {
 180-D one (hidden up to 1024)."""
 
 
-def varied(preset: Preset, changes: Mapping[str, Any]) -> Preset:
+def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
     """The preset with some of its choices changed.
 
     Args:

@@ -83,7 +83,7 @@ class Drivers:
 
 @dataclass
 class Blows:
-    """SIGKILLs that a seed decides: whom and when; and their tally.
+    """SIGKILLs that a seed decides: whom and when; and their counts.
 
     Attributes:
         folder: where the datasets are.
@@ -155,7 +155,7 @@ class Blows:
             self.dealt["raylet"] += victims.kill(pid)
 
     def __str__(self) -> str:
-        """The tally."""
+        """The counts."""
         kinds = ", ".join(f"{count} of {kind}s" for kind, count in sorted(self.dealt.items()))
         return f"{self.dealt.total()} kills (CHAOS_SEED={self.seed}): {kinds}; {self.unfinished} amid a file"
 

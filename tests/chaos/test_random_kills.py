@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cluster.hardware.database import JournalError
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.states import ACTIVE, TERMINAL, State
 from tests.cluster.hardware.desk import carry_out, starts
 from tests.cluster.hardware.test_kills import SIGKILLED, journal_of, resolve
@@ -12,7 +12,7 @@ from tests.cluster.hardware.test_kills import SIGKILLED, journal_of, resolve
 KILLS = 150
 PACE_SECONDS = 0.01
 LONGEST_LIFE_SECONDS = 0.3
-PLAN = Identity("desk", "desk", "climb", 11, "", 10, 6, Approval.POLICY)
+PLAN = CampaignIdentity("desk", "desk", "climb", 11, "", 10, 6, Approval.POLICY)
 
 
 def lived(processes, folder, seconds):

@@ -21,8 +21,8 @@ from cluster.cli.dataset import info
 from cluster.config import CollectSettings
 from cluster.datasets.collect import collect
 from cluster.datasets.gather import note_failure, rollout_pool
-from cluster.datasets.progress import Recorder, Tally
-from cluster.datasets.quarantine import put_aside, quarantined, release
+from cluster.datasets.progress import CollectionProgress, ProgressRecorder
+from cluster.datasets.quarantine import put_aside, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
 from cluster.runtime.actor_pool import Failed
@@ -208,7 +208,7 @@ def test_a_shard_that_keeps_failing_is_put_aside_until_it_succeeds(
         collected(folder, 12, ray_session, tracking_settings)
     dataset = open_dataset(folder)
     assert dataset.shards() == [Shard(0, 8)]
-    assert quarantined(dataset) == [blocked]
+    assert quarantined_shards(dataset) == [blocked]
     kept = json.loads((folder / "quarantine" / f"{blocked.name}.json").read_text())
     assert len(kept["errors"]) == SETTINGS.attempts_per_shard
     assert all("Traceback" in text or "File " in text for text in kept["errors"])
@@ -224,12 +224,12 @@ def test_a_shard_that_keeps_failing_is_put_aside_until_it_succeeds(
 def test_episodes_collected_in_other_shards_are_no_longer_put_aside(tmp_path):
     dataset = alone(tmp_path, 8)
     put_aside(dataset, Shard(8, 12), ["an error"])
-    assert quarantined(dataset) == [Shard(8, 12)]
-    assert quarantined(dataset, episodes=8) == []
+    assert quarantined_shards(dataset) == [Shard(8, 12)]
+    assert quarantined_shards(dataset, episodes=8) == []
     release(dataset)
-    assert quarantined(dataset) == [Shard(8, 12)]
+    assert quarantined_shards(dataset) == [Shard(8, 12)]
     collect_shard(setups.load("franka"), dataset, Shard(8, 16))
-    assert quarantined(dataset) == []
+    assert quarantined_shards(dataset) == []
     release(dataset)
     assert list((tmp_path / "quarantine").iterdir()) == []
 
@@ -239,7 +239,7 @@ def test_a_failing_disk_is_no_shards_failed_attempt(tmp_path, number):
     dataset = create(tmp_path, identity_of(setups.load("franka"), seed=0, episodes_per_shard=8))
     cause = OSError(number, os.strerror(number))
     with pytest.raises(UserError, match=rf"{os.strerror(number)}.*make room"):
-        note_failure(Failed(Shard(0, 8), str(cause), str(cause), cause, 2), dataset, Tally())
+        note_failure(Failed(Shard(0, 8), str(cause), str(cause), cause, 2), dataset, CollectionProgress())
     assert not (tmp_path / "quarantine").exists()
 
 
@@ -262,17 +262,17 @@ def test_an_mlflow_store_that_fails_meanwhile_does_not_end_the_collection(tracki
     """Its file is damaged for a while: what is recorded later is there."""
     tracker = open_tracker(tracking_settings)
     database = Path(tracker.uri.removeprefix("sqlite:///"))
-    tally = Tally(episodes=8)
+    counts = CollectionProgress(episodes=8)
     with tracker.run("collect", "collect", {}) as run:
-        recorder = Recorder(run, interval=0.0)
+        recorder = ProgressRecorder(run, interval=0.0)
         content = database.read_bytes()
         database.write_bytes(b"damaged" * 1000)
-        recorder.record(tally)
-        recorder.record(tally)
+        recorder.record(counts)
+        recorder.record(counts)
         with pytest.raises(UserError, match="cannot be used"):
-            run.metrics(tally.metrics(), step=8)
+            run.metrics(counts.metrics(), step=8)
         database.write_bytes(content)
-        recorder.record(tally)
+        recorder.record(counts)
         assert tracker.client.get_run(run.id).data.metrics["episodes"] == 8
     assert capsys.readouterr().err.count("the collection goes on") == 1
 

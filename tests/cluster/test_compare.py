@@ -22,21 +22,21 @@ from matplotlib.markers import MarkerStyle
 from cluster.comparison import figure
 from cluster.comparison.compare import compare
 from cluster.comparison.folder import alone_in, claim
-from cluster.comparison.plan import Grid, planned, usable
-from cluster.comparison.records import RunKey, all_runs, append, recorded, seeds_in
+from cluster.comparison.plan import Grid, plan_comparison, usable
+from cluster.comparison.records import RunKey, all_runs, append, read_trials, seeds_in
 from cluster.comparison.tracking import begin
-from cluster.comparison.tune import Standing
+from cluster.comparison.tune import BestSoFar
 from cluster.comparison.worker import evaluation
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
 from cluster.tracking import open_tracker
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
 from svaedc.bo.loop import Trial
 from svaedc.bo.methods import names
 from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
-from svaedc.training.presets import Sizes, compact, varied
+from svaedc.training.presets import Sizes, compact, vary
 from workers import setups
 
 SETTINGS = CompareSettings(slots=2, pool_size=200)
@@ -65,7 +65,7 @@ def compared(ray_session, tracking_settings, tmp_path):
         folder: Path = tmp_path / "out",
         tracking: TrackingSettings = tracking_settings,
     ) -> Path:
-        plan = planned(
+        plan = plan_comparison(
             setup=setups.load("franka"),
             grid=Grid(tuple(methods.split(",")), seed=1000, runs=runs),
             trials=trials,
@@ -135,7 +135,7 @@ def test_an_interrupted_comparison_goes_on_trial_by_trial_to_the_same_table(comp
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:3]) + lines[3][:40])
     RunKey("random", 1000).path(out).unlink()
-    assert len(recorded(path)) == 3
+    assert len(read_trials(path)) == 3
     assert table(compared()) == whole
 
 
@@ -212,7 +212,7 @@ def test_a_trial_recorded_twice_counts_once_and_one_after_a_gap_does_not(tmp_pat
     path = tmp_path / "se-00000.jsonl"
     for index, seconds in ((0, 0.1), (1, 0.2), (1, 0.3), (3, 0.4)):
         append(path, trial(index, seconds))
-    assert [(found.index, found.seconds) for found in recorded(path)] == [(0, 0.1), (1, 0.2)]
+    assert [(found.index, found.seconds) for found in read_trials(path)] == [(0, 0.1), (1, 0.2)]
 
 
 def test_the_next_trial_replaces_a_line_that_was_cut_off(tmp_path):
@@ -220,7 +220,7 @@ def test_the_next_trial_replaces_a_line_that_was_cut_off(tmp_path):
     append(path, trial(0))
     path.write_bytes(path.read_bytes() + b'{"trial": 1, "f"')
     append(path, trial(1))
-    assert [found.index for found in recorded(path)] == [0, 1]
+    assert [found.index for found in read_trials(path)] == [0, 1]
     assert path.read_bytes().count(b"\n") == 2
 
 
@@ -350,12 +350,12 @@ def planned_with(**changes):
         "gap": "paper",
         "settings": SETTINGS,
     }
-    return planned(**{**usual, **changes})
+    return plan_comparison(**{**usual, **changes})
 
 
 def test_a_model_without_badness_is_refused_for_methods_that_compress_before_anything_runs(tmp_path):
     torch.manual_seed(0)
-    model = SvaeDc(varied(compact(Sizes(48, 25, 100)), {"model": "svae"}).model)
+    model = SvaeDc(vary(compact(Sizes(48, 25, 100)), {"model": "svae"}).model)
     (tmp_path / "svae").mkdir()
     checkpoint.save(tmp_path / "svae" / "model.pt", model, {"setup": "franka"})
     with pytest.raises(UserError, match="'svae-dc': the model must predict badness, got an SVAE"):
@@ -435,7 +435,7 @@ def test_a_full_disk_ends_a_comparison_with_nothing_lost(compared, disk_with_roo
     small = disk_with_room_for("40k")
     with pytest.raises(UserError, match=r"cannot write to .*No space left on device; make room"):
         compared("random", trials=20, folder=small / "out")
-    kept = [found for path in small.glob("out/runs/*") for found in recorded(path)]
+    kept = [found for path in small.glob("out/runs/*") for found in read_trials(path)]
     assert kept
     shutil.copytree(small / "out", tmp_path / "roomy")
     assert table(compared("random", trials=20, folder=tmp_path / "roomy")) == table(
@@ -448,7 +448,7 @@ def test_a_disk_too_full_for_the_figure_keeps_the_trials(compared, disk_with_roo
     small = disk_with_room_for("64k")
     with pytest.raises(UserError, match=r"cannot write to .*No space left on device; make room"):
         compared("random", runs=1, folder=small / "out")
-    assert len(recorded(RunKey("random", 1000).path(small / "out"))) == 4
+    assert len(read_trials(RunKey("random", 1000).path(small / "out"))) == 4
     assert not list(small.glob("out/.unfinished*"))
     subprocess.run(["mount", "-o", "remount,size=2m", str(small)], check=True)
     assert len(table(compared("random", runs=1, folder=small / "out"))) == 4
@@ -517,8 +517,8 @@ def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_ru
     errors = (out / "errors.txt").read_text()
     assert "comparison.py" in errors
     assert {sign for sign in errors if not sign.isprintable()} == {"\n"}
-    assert len(recorded(RunKey("matern", 1000).path(out))) == 7
-    assert len(recorded(RunKey("se", 1000).path(out))) == 1
+    assert len(read_trials(RunKey("matern", 1000).path(out))) == 7
+    assert len(read_trials(RunKey("se", 1000).path(out))) == 1
     said = capfd.readouterr()
     assert said.out == ""
     lines = [line for line in said.err.splitlines() if "best so far" not in line]
@@ -526,7 +526,7 @@ def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_ru
 
 
 def test_the_standing_shows_every_method_in_the_order_asked_for():
-    standing = Standing(("se", "random"), {RunKey("random", 0): 0.25, RunKey("random", 1): 0.75})
+    standing = BestSoFar(("se", "random"), {RunKey("random", 0): 0.25, RunKey("random", 1): 0.75})
     assert str(standing) == "random 0.50"
     standing.best[RunKey("se", 0)] = 0.125
     assert str(standing) == "se 0.12, random 0.50"
@@ -540,7 +540,7 @@ def test_the_figure_has_the_same_bytes_every_time_and_names_every_method(tmp_pat
         Row(name, run, index, float(rng.uniform(-1, 1)), success=False)
         for name, run, index in ((n, r, t) for n in names() for r in range(3) for t in range(5))
     ]
-    summary = summarise([*rows, Row("unfinished", 0, 0, 0.0, success=False)], Reporting(), rng)
+    summary = summarize([*rows, Row("unfinished", 0, 0, 0.0, success=False)], Reporting(), rng)
     drawn = [
         figure.best_so_far(tmp_path / name, summary, title="some title", initial=2, limits=(-1.0, 1.0))
         for name in ("one.png", "other.png")

@@ -11,7 +11,7 @@ from cluster.demo import DemoSize, conclusion, demo, verdict
 from cluster.errors import UserError
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
 from workers.randomness import generator
 
@@ -23,7 +23,7 @@ def summary(f_of: dict[str, list[float]]):
     rows = [
         Row(method, run, 0, f, success=False) for method, all_f in f_of.items() for run, f in enumerate(all_f)
     ]
-    return summarise(rows, Reporting(initial=0), generator(0, "bootstrap", 0))
+    return summarize(rows, Reporting(initial=0), generator(0, "bootstrap", 0))
 
 
 def difference(ours: list[float], theirs: list[float]):

@@ -7,12 +7,12 @@ import pytest
 
 from cluster.config import CollectSettings
 from cluster.datasets.collect import collect, foretell
-from cluster.datasets.pilot import PLAN, begin, review, spent
-from cluster.datasets.progress import Tally
+from cluster.datasets.pilot import PLAN, add_cost, begin, review
+from cluster.datasets.progress import CollectionProgress
 from cluster.errors import UserError
 from cluster.tracking import open_tracker
 from workers import setups
-from workers.collection.forecast import Estimate, Forecast
+from workers.collection.forecast import Forecast, Prediction
 from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.storage.temporary import WRITING
@@ -41,15 +41,15 @@ def dataset(tmp_path):
 EXPECTED = Forecast(
     episodes=100,
     actors=2,
-    core_hours=Estimate(2.0, 0.1),
-    hours=Estimate(1.0, 0.1),
-    size=Estimate(1e6, 0.0),
-    badness=Estimate(0.5, 0.1),
+    core_hours=Prediction(2.0, 0.1),
+    hours=Prediction(1.0, 0.1),
+    size=Prediction(1e6, 0.0),
+    badness=Prediction(0.5, 0.1),
 )
 
 
-def did(episodes: int, core_hours: float, bad: float = 0.5) -> Tally:
-    return Tally(
+def did(episodes: int, core_hours: float, bad: float = 0.5) -> CollectionProgress:
+    return CollectionProgress(
         episodes=episodes,
         rollout_seconds=3600 * core_hours,
         size=12_000 * episodes,
@@ -90,7 +90,7 @@ def test_the_plan_is_no_part_of_the_dataset(dataset):
 def test_how_far_off_a_plan_was_is_its_account_against_it(dataset):
     """Twenty episodes of a killed command are missing in the account: they count on neither side."""
     begin(dataset, 0, EXPECTED, did(20, 0.4))
-    spent(dataset, did(60, 1.4, bad=0.6), 5400.0)
+    add_cost(dataset, did(60, 1.4, bad=0.6), 5400.0)
     off = review(dataset)
     assert off["plan/core_hours_off"] == pytest.approx(1.8 / 1.6 - 1)
     assert off["plan/hours_off"] == pytest.approx(0.75 / 0.8 - 1, abs=1e-3)
@@ -104,7 +104,7 @@ def test_a_plan_is_judged_once_and_not_before_its_end(dataset):
     begin(dataset, 0, EXPECTED, did(20, 0.4))
     assert review(dataset)
     kept = (dataset.folder / PLAN).read_text()
-    spent(dataset, did(60, 1.4), 5400.0)
+    add_cost(dataset, did(60, 1.4), 5400.0)
     assert review(dataset) == {}
     assert (dataset.folder / PLAN).read_text() == kept
 
@@ -112,7 +112,7 @@ def test_a_plan_is_judged_once_and_not_before_its_end(dataset):
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"expected": {}}', '{"expected": 1, "spent": [1]}'])
 def test_a_plan_that_nobody_can_read_changes_nothing(dataset, content):
     (dataset.folder / PLAN).write_text(content)
-    spent(dataset, did(60, 1.4), 5400.0)
+    add_cost(dataset, did(60, 1.4), 5400.0)
     assert review(dataset) == {}
     assert (dataset.folder / PLAN).read_text() == content
 

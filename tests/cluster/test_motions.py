@@ -25,13 +25,13 @@ def episode(small_dataset):
 
 def shown(episode, stride: int):
     """A telling whose model repeats the episode exactly."""
-    from cluster.rendering.model_frames import Telling
-    from svaedc.model.reconstruction import Rendition
-    from workers.rollout import sampled
+    from cluster.rendering.model_frames import ModelView
+    from svaedc.model.reconstruction import Reconstruction
+    from workers.rollout import stride_steps
 
-    xi = episode.xi[:, sampled(500, stride)]
-    told = (Rendition("reconstructed", xi, 0.25), Rendition("generated", xi, float("nan")))
-    return Telling("title", episode, told, stride)
+    xi = episode.xi[:, stride_steps(500, stride)]
+    told = (Reconstruction("reconstructed", xi, 0.25), Reconstruction("generated", xi, float("nan")))
+    return ModelView("title", episode, told, stride)
 
 
 def parts(strip):
@@ -73,18 +73,18 @@ def test_blocks_stand_in_rows_of_two_below_their_titles():
 
 
 def test_an_episode_of_other_sizes_than_the_models_is_refused(episode):
-    from cluster.rendering.model_frames import telling
+    from cluster.rendering.model_frames import model_view
     from svaedc.model.config import ModelConfig
     from svaedc.model.svae_dc import SvaeDc
 
     model = SvaeDc(ModelConfig(48, 25, 50)).eval()
     with pytest.raises(ValueError, match=r"\(48, 25, 50\), this episode has \(48, 25, 100\)"):
-        telling("title", episode, model, 5)
-    assert telling("title", episode, model, 10).told[1].xi.shape == (25, 50)
+        model_view("title", episode, model, 5)
+    assert model_view("title", episode, model, 10).told[1].xi.shape == (25, 50)
 
 
 def test_a_setup_with_nothing_to_see_leaves_no_file_and_says_so(tmp_path, capsys):
-    from cluster.rendering.model_frames import remarkable_motions
+    from cluster.rendering.model_frames import write_remarkable
     from svaedc.model.config import ModelConfig
     from svaedc.model.svae_dc import SvaeDc
     from workers import setups
@@ -98,15 +98,15 @@ def test_a_setup_with_nothing_to_see_leaves_no_file_and_says_so(tmp_path, capsys
         collect_shard(quadratic, dataset, shard)
     cache = training_cache(dataset, 1, tmp_path / "cache")
     model = SvaeDc(ModelConfig(30, 30, 100)).eval()
-    assert remarkable_motions(tmp_path, model, dataset, cache, 1, 3) == []
+    assert write_remarkable(tmp_path, model, dataset, cache, 1, 3) == []
     assert "quadratic-30d has nothing to see" in capsys.readouterr().err
     assert not list(tmp_path.glob("motions*"))
 
 
 def test_a_clip_and_its_stills_come_from_the_same_moments(setup, episode, tmp_path):
-    from cluster.rendering.model_frames import motions
+    from cluster.rendering.model_frames import write_model_frames
 
-    made = motions(tmp_path, [shown(episode, 5)], setup, 2)
+    made = write_model_frames(tmp_path, [shown(episode, 5)], setup, 2)
     assert [path.name for path in made] == ["motions.png", "motions.gif"]
     with Image.open(made[1]) as clip, Image.open(made[0]) as stills:
         assert clip.n_frames == 2

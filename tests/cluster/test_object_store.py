@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from cluster.cli.main import app
-from cluster.datasets.gather import planned
-from cluster.datasets.pilot import spent
-from cluster.datasets.progress import Tally
-from cluster.datasets.quarantine import put_aside, quarantined, release
+from cluster.datasets.gather import open_and_plan
+from cluster.datasets.pilot import add_cost
+from cluster.datasets.progress import CollectionProgress
+from cluster.datasets.quarantine import put_aside, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UsageError, UserError
 from cluster.inputs import dataset_location, durable_dataset
@@ -109,11 +109,11 @@ def test_errors_of_shards_and_the_account_of_a_plan_are_kept_in_it(remote):
     missing = replace(remote.shards()[0], start=8, stop=12)
     path = put_aside(remote, missing, ["it failed"])
     assert "it failed" in path.read_text()
-    assert quarantined(remote, 12) == [missing]
+    assert quarantined_shards(remote, 12) == [missing]
     RolloutActor(SETUP, str(remote.folder)).collect(missing)
     release(remote)
-    assert quarantined(remote) == []
-    spent(remote, Tally(episodes=4), 1.0)
+    assert quarantined_shards(remote) == []
+    add_cost(remote, CollectionProgress(episodes=4), 1.0)
     assert open_dataset(remote.folder).episodes() == 12
 
 
@@ -125,7 +125,7 @@ def test_a_store_that_cannot_be_used_is_told_with_the_remedy(where, free_port, r
     }
     address, message = wrong[where]
     with pytest.raises(UserError, match=message):
-        planned(remote.identity, 8, dataset_location(address))
+        open_and_plan(remote.identity, 8, dataset_location(address))
 
 
 def command(*arguments: str, root: Path) -> list[str]:

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 
 from cluster.comparison.html import page
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
 
 
@@ -27,7 +27,7 @@ def reaching(rows: list[Row]) -> list[Row]:
 
 
 def summary(rows: list[Row]):
-    return summarise(rows, Reporting(), np.random.default_rng(0))
+    return summarize(rows, Reporting(), np.random.default_rng(0))
 
 
 class Elements(HTMLParser):

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from cluster.datasets.progress import Rates, Tally
+from cluster.datasets.progress import CollectionProgress, Rates
 from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
 
@@ -56,12 +56,14 @@ def test_one_machine_is_not_named_and_many_are_not_listed():
 
 
 def test_a_tally_tells_mlflow_the_time_left_and_the_rate_of_every_machine():
-    tally = Tally(planned=40, begin=time.monotonic() - 10.0, rates=Rates(begin=time.monotonic() - 10.0))
-    assert math.isnan(tally.metrics()["seconds_left"])
-    tally.add(report("one", Shard(0, 8)))
-    tally.add(report("two", Shard(8, 10)))
-    metrics = tally.metrics()
+    counts = CollectionProgress(
+        planned=40, begin=time.monotonic() - 10.0, rates=Rates(begin=time.monotonic() - 10.0)
+    )
+    assert math.isnan(counts.metrics()["seconds_left"])
+    counts.add(report("one", Shard(0, 8)))
+    counts.add(report("two", Shard(8, 10)))
+    metrics = counts.metrics()
     assert metrics["seconds_left"] == pytest.approx(30.0, rel=0.2)
     assert metrics["machine/one/episodes_per_second"] == pytest.approx(0.8, rel=0.2)
     assert metrics["machine/two/episodes_per_second"] == pytest.approx(0.2, rel=0.2)
-    assert tally.note().startswith("bad 0.25, one 0.")
+    assert counts.note().startswith("bad 0.25, one 0.")

@@ -22,9 +22,9 @@ def setup():
 @pytest.fixture(scope="module")
 def episode(setup):
     """Six made-up steps are bad in one way, the last step in two."""
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
 
-    made = exhibit("random:7", setup, None)
+    made = episode_to_draw("random:7", setup, None)
     bad = np.zeros(60, dtype=np.uint8)
     bad[11:17], bad[59] = 1, 0b110
     return replace(made, bad=bad)
@@ -60,10 +60,10 @@ def test_stills_show_the_first_and_last_step_and_what_holds_just_then(setup, epi
 
 
 def test_a_graded_condition_is_shown_with_its_degree(setup):
-    from cluster.rendering.frames import held
+    from cluster.rendering.frames import conditions_in
 
-    assert held(setup, np.array([0.0, 0.25, 0.1], dtype=np.float32)) == ("object_tipped 25%",)
-    assert held(setup, np.zeros(3, dtype=np.float32)) == ()
+    assert conditions_in(setup, np.array([0.0, 0.25, 0.1], dtype=np.float32)) == ("object_tipped 25%",)
+    assert conditions_in(setup, np.zeros(3, dtype=np.float32)) == ()
 
 
 @pytest.mark.parametrize(("seconds", "speed"), [(1.0, 0.2), (6.0, 1.0), (24.0, 3.0)])
@@ -83,11 +83,11 @@ def test_a_speed_that_cannot_be_shown_is_refused(setup, episode, speed):
 
 
 def test_only_a_bad_step_has_a_red_border_and_the_picture_itself_stays():
-    from cluster.rendering.frames import RED, captioned
+    from cluster.rendering.frames import RED, caption
 
     blank = np.full((90, 120, 3), 90, dtype=np.uint8)
-    good = captioned(blank, "0.10 s", "franka", ())
-    bad = captioned(blank, "0.10 s", "franka", ("object_tipped",))
+    good = caption(blank, "0.10 s", "franka", ())
+    bad = caption(blank, "0.10 s", "franka", ("object_tipped",))
     assert (blank == 90).all()
     for edge in (bad[0], bad[-1], bad[:, 0], bad[:, -1]):
         assert (edge == RED).all()
@@ -139,38 +139,40 @@ def test_an_mp4_opens_again_with_every_picture_and_its_rate(stripes, tmp_path):
 
 
 def test_a_controller_given_in_three_ways_is_the_same(setup, tmp_path):
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
     from workers.randomness import generator
 
     x = generator(7, "controller", 0).random(48, dtype=np.float32)
     np.save(tmp_path / "x.npy", x)
     listed = ",".join(str(number) for number in x)
-    episodes = [exhibit(wanted, setup, None) for wanted in ("random:7", str(tmp_path / "x.npy"), listed)]
+    episodes = [
+        episode_to_draw(wanted, setup, None) for wanted in ("random:7", str(tmp_path / "x.npy"), listed)
+    ]
     assert all((episode.x == x).all() for episode in episodes)
     assert len({episode.xi.tobytes() for episode in episodes}) == 1
 
 
 def test_a_seed_draws_the_physics_of_data_collection(setup):
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
     from workers.rollout import random_episode
 
     with setup.open() as environment:
         collected = random_episode(setup, environment, 7, 0)
-    shown = exhibit("random:7", setup, 7)
+    shown = episode_to_draw("random:7", setup, 7)
     assert shown.physics == collected.physics
     assert shown.xi.tobytes() == collected.xi.tobytes()
-    assert exhibit("random:7", setup, None).physics["object1_mass"] == pytest.approx(2.0)
+    assert episode_to_draw("random:7", setup, None).physics["object1_mass"] == pytest.approx(2.0)
 
 
 def test_an_episode_of_a_dataset_comes_as_it_was_recorded(small_dataset):
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
     from workers import setups
     from workers.rollout import random_episode
 
     franka = setups.load("franka")
     with franka.open() as environment:
         collected = random_episode(franka, environment, 0, 11)
-    shown = exhibit(f"dataset:{small_dataset}:11", franka, None)
+    shown = episode_to_draw(f"dataset:{small_dataset}:11", franka, None)
     assert shown.xi.tobytes() == collected.xi.tobytes()
     assert shown.bad.tobytes() == collected.bad.tobytes()
     assert shown.physics == collected.physics
@@ -192,21 +194,21 @@ def test_an_episode_of_a_dataset_comes_as_it_was_recorded(small_dataset):
 )
 def test_a_controller_that_does_not_exist_is_refused_with_a_remedy(setup, wanted, message):
     from cluster.errors import UserError
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
 
     with pytest.raises(UserError, match=message):
-        exhibit(wanted, setup, None)
+        episode_to_draw(wanted, setup, None)
 
 
 def test_an_episode_that_a_dataset_does_not_hold_is_refused(small_dataset):
     from cluster.errors import UsageError
-    from cluster.rendering.episodes import exhibit
+    from cluster.rendering.episodes import episode_to_draw
     from workers import setups
 
     with pytest.raises(UsageError, match="holds no episode 16; its files hold 0 to 7, 8 to 15"):
-        exhibit(f"dataset:{small_dataset}:16", setups.load("franka"), None)
+        episode_to_draw(f"dataset:{small_dataset}:16", setups.load("franka"), None)
     with pytest.raises(UsageError, match="is of franka, not of daisy-11d; use --setup franka"):
-        exhibit(f"dataset:{small_dataset}:0", setups.load("daisy-11d"), None)
+        episode_to_draw(f"dataset:{small_dataset}:0", setups.load("daisy-11d"), None)
 
 
 def test_the_command_writes_what_it_says(tmp_path):

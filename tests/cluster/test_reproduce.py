@@ -15,19 +15,19 @@ from cluster.errors import UserError
 from cluster.reproduction.cost import bill, lines
 from cluster.reproduction.experiment import Panel, Recipe
 from cluster.reproduction.figures import RECIPES
-from cluster.reproduction.plan import SCALES, resolved
+from cluster.reproduction.plan import SCALES, resolve
 from cluster.reproduction.report import publish, table
 from cluster.reproduction.run import reproduce
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.evidence import Claim, Successes
 from svaedc.analysis.paired_evidence import Gain
 from svaedc.analysis.summary import Reporting, Row
 from svaedc.bo.loop import Trial
 from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
-from svaedc.training.presets import Sizes, compact, varied
+from svaedc.training.presets import Sizes, compact, vary
 from workers import setups
 from workers.collection.shard import collect_shard
 from workers.dataset.folder import create
@@ -60,7 +60,7 @@ def few_episodes(tmp_path_factory):
 
 
 def plan_of(recipe, folder, dataset=None, models=(), episodes=300, runs=2):
-    return resolved(
+    return resolve(
         recipe, MACHINE, folder, episodes=episodes, runs=runs, dataset=dataset, models=tuple(models)
     )
 
@@ -68,7 +68,7 @@ def plan_of(recipe, folder, dataset=None, models=(), episodes=300, runs=2):
 def untrained(folder, setup="franka", latent="3x3"):
     torch.manual_seed(0)
     folder.mkdir()
-    model = SvaeDc(varied(compact(Sizes(48, 25, 100)), {"latent": latent}).model)
+    model = SvaeDc(vary(compact(Sizes(48, 25, 100)), {"latent": latent}).model)
     checkpoint.save(folder / "model.pt", model, {"setup": setup})
     return folder
 
@@ -161,7 +161,7 @@ def compared(ends: dict[str, list[float]]):
         for run, end in enumerate(all_f)
         for trial in range(4)
     ]
-    return summarise(rows, Reporting(), np.random.default_rng(0))
+    return summarize(rows, Reporting(), np.random.default_rng(0))
 
 
 def test_the_table_holds_numbers_against_claims_and_calls_a_stand_in_one(tmp_path):

@@ -12,10 +12,10 @@ from cluster.files import write_json
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
 from cluster.training.sweep import CHANGES, require_one_cpu, sweep
-from cluster.training.sweep_worker import RESULT, Point
+from cluster.training.sweep_worker import RESULT, SweepPoint
 from cluster.training.train import working_in
 from cluster.training.worker import TrainingJob
-from svaedc.training.presets import Sizes, preset, varied
+from svaedc.training.presets import Sizes, preset, vary
 from workers import setups
 
 
@@ -23,7 +23,7 @@ from workers import setups
 def test_every_point_of_the_sweep_is_another_model_than_the_preset(name):
     settings = TrainSettings().model_copy(update={**CHANGES[name]})
     made = preset("compact")(Sizes(48, 25, 100))
-    assert varied(made, settings.changes()) != made or settings.stride != TrainSettings().stride
+    assert vary(made, settings.changes()) != made or settings.stride != TrainSettings().stride
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_settings_that_a_sweep_follows_are_not_refused():
     assert [require_one_cpu(settings) for settings in passed] == [None, None]
 
 
-def point(folder: Path, updates: int = 100, **origin: object) -> Point:
+def point(folder: Path, updates: int = 100, **origin: object) -> SweepPoint:
     """A point whose folder is below `folder`; its dataset is not looked at."""
     made = {
         "setup": "franka",
@@ -61,10 +61,10 @@ def point(folder: Path, updates: int = 100, **origin: object) -> Point:
         time_limit=float("inf"),
         checkpoint_every=1,
     )
-    return Point("kl-3", job, updates)
+    return SweepPoint("kl-3", job, updates)
 
 
-def written(of: Point) -> Point:
+def written(of: SweepPoint) -> SweepPoint:
     """The same point, with the result that its sweep leaves."""
     of.job.model.mkdir(parents=True)
     result = {"name": of.name, "origin": of.job.origin, "updates": of.updates, "update": of.updates}

@@ -18,7 +18,7 @@ from ray.train.v2._internal.exceptions import (
 )
 
 from cluster.training.failures import explanation, is_death
-from cluster.training.launch import interrupts_kept
+from cluster.training.launch import keep_interrupts
 
 KILLED = WorkerHealthCheckFailedError("A worker health check failed.\nWorker info: ...", ActorDiedError())
 # As torch 2.13 words it in one process when the other is killed.
@@ -104,7 +104,7 @@ def test_ray_train_tells_a_killed_process_of_a_group_from_one_with_an_error(tmp_
         scaling_config=ScalingConfig(num_workers=2, resources_per_worker={"CPU": 1}),
         run_config=RunConfig(storage_path=str(tmp_path)),
     )
-    with interrupts_kept(), pytest.raises(TrainingFailedError) as raised:
+    with keep_interrupts(), pytest.raises(TrainingFailedError) as raised:
         trainer.fit()
     assert is_death(raised.value) == dies
     assert ("keep dying" in explanation(raised.value, tmp_path)) == dies

@@ -16,8 +16,8 @@ from cluster.runtime.mailbox import mailbox
 from cluster.runtime.placement import Placement
 from cluster.runtime.signals import terminating_as_exit
 from cluster.tracking import open_tracker
-from cluster.training.launch import interrupts_kept, submit
-from cluster.training.worker import TrainingJob, trained
+from cluster.training.launch import keep_interrupts, submit
+from cluster.training.worker import TrainingJob, train_together
 from svaedc.model import checkpoint
 from workers.dataset.folder import open_dataset
 
@@ -54,7 +54,7 @@ def test_two_processes_train_one_model(job, tmp_path):
     def save_copy(config):
         import ray.train
 
-        model = trained(config["job"], config["mailbox"])
+        model = train_together(config["job"], config["mailbox"])
         torch.save(model.state_dict(), config["folder"] / f"{ray.train.get_context().get_world_rank()}.pt")
 
     with mailbox([].append) as box:
@@ -64,7 +64,7 @@ def test_two_processes_train_one_model(job, tmp_path):
             scaling_config=ScalingConfig(num_workers=2, resources_per_worker={"CPU": 1}),
             run_config=RunConfig(storage_path=str(tmp_path / "ray")),
         )
-        with interrupts_kept():
+        with keep_interrupts():
             trainer.fit()
     one, other = (torch.load(tmp_path / f"{rank}.pt", weights_only=True) for rank in range(2))
     saved = checkpoint.load(job.model / "model.pt")[0].state_dict()
@@ -95,7 +95,7 @@ def test_ctrl_c_and_sigterm_keep_their_meaning_whatever_ray_makes_of_them():
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 
     def leave(number: int) -> None:
-        with terminating_as_exit(), interrupts_kept():
+        with terminating_as_exit(), keep_interrupts():
             # Ray Train's handler, and what `ray.get` makes of every exit.
             signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
             try:

@@ -40,7 +40,7 @@ def distributions(shape, seed):
 
 
 def compressed(outer, embedding):
-    return Case(lambda: kernels.compressed(outer(K), embedding), paths_and_badness)
+    return Case(lambda: kernels.compressed_kernel(outer(K), embedding), paths_and_badness)
 
 
 WHITENED = Whitened(torch.tensor([0.5, 1.0, 2.0]).double())
@@ -190,7 +190,7 @@ def test_bad_controllers_are_closer_to_each_other_than_good_ones(case):
 @pytest.mark.parametrize("name", ["bbk-kl", "lkl"])
 def test_kl_kernel_needs_its_jitter_and_takes_no_more_than_it_needs(name):
     case = CASES[name]
-    kernel = kernels.SymmetrisedKl(case.kernel().base_kernel.divergence, median=30.0).double()
+    kernel = kernels.SymmetrizedKl(case.kernel().base_kernel.divergence, median=30.0).double()
     lifted = 0
     for seed in range(5):
         # Scales that differ by orders of magnitude are what breaks definiteness.

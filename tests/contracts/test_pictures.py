@@ -11,7 +11,7 @@ import pytest
 from workers import setups
 from workers.rendering import Show, Size, frames, pose_of, scenery_of
 from workers.rollout import random_episode
-from workers.simulation.stage import Stage
+from workers.simulation.stage import Scene
 
 STEPS = 120  # long enough for an arm to reach its objects and for a walker to leave its start
 
@@ -68,7 +68,7 @@ def test_the_replayed_scene_is_where_the_simulation_ended(setup, environment, ep
     names = {channel.name for channel in setup.observation}
     random_episode(setup, environment, 0, 3)  # leaves the simulation at the episode's end
     simulated = dict(_links(environment._world.client, names))
-    with Stage() as stage:
+    with Scene() as stage:
         show = Show(stage, environment.scenery, setup.observation)
         show.pose(episode.xi[:, -1], np.zeros(3))
         shown = dict(_links(stage.client, names))
@@ -109,7 +109,7 @@ def test_rollouts_load_nothing_that_is_only_seen(setup, environment):
     for body in _bodies(client):
         touched, seen = _shapes(client, body)
         assert seen == touched
-    with Stage() as stage:
+    with Scene() as stage:
         body = Show(stage, environment.scenery, setup.observation).bodies[0][0]
         touched, seen = _shapes(stage.client, body)
         assert seen != touched

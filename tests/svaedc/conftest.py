@@ -50,9 +50,9 @@ def small_config():
 
 @pytest.fixture
 def model(small_config, halves, bounds):
-    from svaedc.model.svae_dc import initialised
+    from svaedc.model.svae_dc import initialized_model
 
-    return initialised(small_config, halves[0], bounds, seed=0)
+    return initialized_model(small_config, halves[0], bounds, seed=0)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.evidence import Claim, Evidence, MedianGap, Steadier, Successes
 from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
 from svaedc.analysis.summary import Reporting, Row
@@ -21,7 +21,7 @@ def panel(ends: dict[str, list[float]], success_above: float = 0.5):
         for run, end in enumerate(all_f)
         for trial, f in enumerate([-1.0, -1.0, end, end, end])
     ]
-    return summarise(rows, Reporting(initial=INITIAL), np.random.default_rng(0))
+    return summarize(rows, Reporting(initial=INITIAL), np.random.default_rng(0))
 
 
 NOISE = np.linspace(-0.1, 0.1, 8)

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from svaedc.model.diagnostics import collapse, evaluate
-from svaedc.model.svae_dc import initialised
+from svaedc.model.svae_dc import initialized_model
 
 GOOD = {"active_share": 1.0, "rec_norm": 0.5, "gen_norm": 0.6, "corr_y_rec": 0.99, "mae_y_rec": 0.01}
 ABOUT_Y = ("corr_y_rec", "mae_y_rec")
@@ -127,7 +127,7 @@ def test_a_y_that_does_not_vary_is_no_badness_to_learn_and_is_said_with_a_remedy
 
 
 def test_no_badness_is_asked_of_a_model_without_psi(small_config, halves, bounds):
-    model = initialised(replace(small_config, psi_dim=0), halves[0], bounds, seed=0)
+    model = initialized_model(replace(small_config, psi_dim=0), halves[0], bounds, seed=0)
     metrics = evaluate(model, halves[1])
     assert collapse(GOOD | {name: metrics[name] for name in ABOUT_Y}) is None
 

@@ -20,7 +20,7 @@ from svaedc.model import initialised
 from svaedc.sampling import Shard
 from svaedc.settings import StageSettings, TrainingSettings, Weighting
 from svaedc.training import fit
-from svaedc.workplace import Workplace
+from svaedc.context import Workplace
 
 folder, rank, world, joint = Path(sys.argv[1]), *map(int, sys.argv[2:])
 rng = np.random.default_rng(0)
@@ -35,7 +35,7 @@ settings = TrainingSettings(stage, replace(stage, updates=20), Weighting(1.0, 1.
 if world > 1:
     init_process_group("gloo", init_method=f"file://{folder}/meeting", rank=rank, world_size=world)
 wrap = DistributedDataParallel if world > 1 else lambda module: module
-list(fit(model, *halves, settings, workplace=Workplace(Shard(rank, world), parallelise=wrap)))
+list(fit(model, *halves, settings, context=Workplace(Shard(rank, world), parallelise=wrap)))
 torch.save(model.state_dict(), folder / f"{rank}.pt")
 if world > 1:
     destroy_process_group()

@@ -48,7 +48,7 @@ def test_kernel_is_the_formula_pair_by_pair(kernel, profile, lengthscales):
 
 def test_svae_dc_is_the_formula_pair_by_pair():
     lengthscales = [0.3, 0.8, 1.4]
-    kernel = kernels.compressed(with_lengthscales(kernels.se(3), lengthscales), svae_dc)
+    kernel = kernels.compressed_kernel(with_lengthscales(kernels.se(3), lengthscales), svae_dc)
     tau, y = latent_means(points(7, 5))
     phi = torch.stack([(1 - b) * t for t, b in zip(tau, y, strict=True)])
     rows = torch.cat([tau, y[:, None]], dim=1)
@@ -59,7 +59,7 @@ def test_svae_dc_is_the_formula_pair_by_pair():
 def test_svae_dc_on_latents_equals_the_outer_kernel_on_cached_features(kernel):
     tau, y = latent_means(points(9, 4))
     outer = kernel(3).double()
-    whole = kernels.compressed(outer, svae_dc)(torch.cat([tau, y[:, None]], dim=1))
+    whole = kernels.compressed_kernel(outer, svae_dc)(torch.cat([tau, y[:, None]], dim=1))
     torch.testing.assert_close(whole.to_dense(), outer(svae_dc(tau, y)).to_dense())
 
 

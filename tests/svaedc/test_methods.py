@@ -157,7 +157,7 @@ def test_a_kernel_has_a_lengthscale_for_every_dimension_of_its_features():
         history = history.append(x, quadratic(x))
     expected = {"se": 4, "matern": 4, "svae": 3, "svae-dc-matern": 3, "svae-dc-whitened": 3}
     for name, count in expected.items():
-        surrogate, _ = methods.build(name, given).belief.after(history)
+        surrogate, _ = methods.build(name, given).surrogate.after(history)
         assert surrogate.model.covar_module.base_kernel.lengthscale.numel() == count
 
 
@@ -165,14 +165,14 @@ def test_trust_region_keeps_to_its_box_and_begins_anew_with_random_controllers()
     method, history = methods.build("turbo-pool", problem(4, 200, 0)), History.empty(4)
     for x in np.random.default_rng(0).random((2, 4), dtype=np.float32):
         history = history.append(x, 0.0)
-    centre = history.x[0]
+    center = history.x[0]
     # Flat outcomes halve the box from 0.8 until it is left: 7 halvings of 4 failures each.
     for index in range(28):
         x = method.suggest(history, np.random.default_rng(index))
         history = history.append(x, 0.0)
-    assert np.abs(history.x[-1] - centre).max() < 0.05 < np.abs(history.x[2] - centre).max()
+    assert np.abs(history.x[-1] - center).max() < 0.05 < np.abs(history.x[2] - center).max()
     fresh = [method.suggest(history, np.random.default_rng(index)) for index in range(20)]
-    assert np.abs(np.array(fresh) - centre).max() > 0.4
+    assert np.abs(np.array(fresh) - center).max() > 0.4
 
 
 def test_method_without_its_model_or_pool_says_what_to_do():

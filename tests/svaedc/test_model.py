@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from svaedc.model.config import ModelConfig, ScaleBounds
-from svaedc.model.svae_dc import SvaeDc, initialised
+from svaedc.model.svae_dc import SvaeDc, initialized_model
 
 VARIANTS = [
     pytest.param(
@@ -23,7 +23,7 @@ VARIANTS = [
 
 @pytest.fixture(params=VARIANTS)
 def variant(request, small_config, halves, bounds):
-    return initialised(replace(small_config, **request.param), halves[0], bounds, seed=1).eval()
+    return initialized_model(replace(small_config, **request.param), halves[0], bounds, seed=1).eval()
 
 
 def test_the_bound_is_the_mean_of_its_sampled_four_term_form(variant, batch):
@@ -99,7 +99,7 @@ def test_identical_calls_in_evaluation_mode_agree_to_the_bit(model, batch):
     assert all(torch.equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def test_an_initialised_model_decodes_near_the_median(model):
+def test_an_initialized_model_decodes_near_the_median(model):
     decoded = model.p_xi(torch.zeros(1, 9)).loc[0]
     residual = (decoded - model.normaliser.median).abs() / model.normaliser.spread
     assert residual.mean() < 0.5
@@ -109,7 +109,7 @@ def test_the_seed_determines_the_weights_and_leaves_torch_s_generator_alone(smal
     torch.manual_seed(5)
     expected = torch.rand(1)
     torch.manual_seed(5)
-    first, second, other = (initialised(small_config, halves[0], bounds, seed) for seed in (3, 3, 4))
+    first, second, other = (initialized_model(small_config, halves[0], bounds, seed) for seed in (3, 3, 4))
     assert torch.equal(torch.rand(1), expected)
     for name, value in first.state_dict().items():
         assert torch.equal(value, second.state_dict()[name]), name
@@ -118,7 +118,7 @@ def test_the_seed_determines_the_weights_and_leaves_torch_s_generator_alone(smal
 
 def test_episodes_of_other_sizes_are_refused_with_both(small_config, halves, bounds):
     with pytest.raises(ValueError, match=r"x \(7,\).*got \(6,\).*training stride"):
-        initialised(replace(small_config, controller_dim=7), halves[0], bounds, seed=0)
+        initialized_model(replace(small_config, controller_dim=7), halves[0], bounds, seed=0)
 
 
 @pytest.fixture(params=["laplace", "gaussian"])
@@ -135,7 +135,7 @@ def tiny(request, episodes, bounds):
         badness_hidden=(8,),
         latent_scale=ScaleBounds(0.2, 2.0),
     )
-    return initialised(config, episodes, bounds, seed=0).double().eval()
+    return initialized_model(config, episodes, bounds, seed=0).double().eval()
 
 
 def test_the_bound_and_its_gap_to_the_evidence_are_those_of_numerical_integration(tiny, batch):
@@ -173,7 +173,9 @@ def over(distribution, grid):
 
 @pytest.fixture(params=["low-rank", "dense"])
 def svae(request, small_config, halves, bounds):
-    return initialised(replace(small_config, psi_dim=0, head=request.param), halves[0], bounds, seed=1).eval()
+    return initialized_model(
+        replace(small_config, psi_dim=0, head=request.param), halves[0], bounds, seed=1
+    ).eval()
 
 
 def test_the_svae_s_bound_is_the_three_term_one_and_knows_nothing_of_badness(svae, batch):
@@ -220,7 +222,7 @@ def test_bad_steps_and_y_reach_the_posterior(model, batch):
     assert not torch.equal(loc, model.posterior(batch.xi, batch.bad, 1.0 - batch.y).loc)
 
 
-def test_few_training_episodes_still_initialise_a_model(small_config, halves, bounds):
+def test_few_training_episodes_still_initialize_a_model(small_config, halves, bounds):
     few = replace(halves[0], rows=np.arange(3))
-    model = initialised(small_config, few, bounds, seed=0)
+    model = initialized_model(small_config, few, bounds, seed=0)
     assert all(torch.isfinite(value).all() for value in model.state_dict().values())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from svaedc.model.normalizer import SPREAD_FLOOR, Normaliser, measure
+from svaedc.model.normalizer import SPREAD_FLOOR, Normalizer, measure
 
 RNG = np.random.default_rng(1)
 
@@ -73,7 +73,7 @@ def test_no_trajectories_are_refused():
 
 
 def test_scaling_puts_the_bounds_at_zero_and_one_and_back():
-    normaliser = Normaliser(3, 30)
+    normaliser = Normalizer(3, 30)
     normaliser.adopt(measured(trajectories()))
     xi = torch.stack([torch.full((3, 30), -4.0), torch.full((3, 30), 4.0)])
     scaled = normaliser.scaled(xi)

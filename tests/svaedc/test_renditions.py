@@ -8,12 +8,12 @@ import torch
 
 
 def test_renditions_are_the_models_reconstruction_and_generation(model, episodes):
-    from svaedc.model.reconstruction import renditions
+    from svaedc.model.reconstruction import reconstructions
 
     model.eval()
     row = 3
     x, xi, bad = episodes.x[row], episodes.xi[row], episodes.bad[row]
-    first, second = renditions(model, x, xi, bad, float(episodes.y[row]))
+    first, second = reconstructions(model, x, xi, bad, float(episodes.y[row]))
     batch = episodes.gather(np.array([row]), torch.device("cpu"))
     with torch.no_grad():
         reconstructed, generated = model.reconstruct(batch.xi, batch.bad, batch.y), model.generate(batch.x)
@@ -25,11 +25,11 @@ def test_renditions_are_the_models_reconstruction_and_generation(model, episodes
 
 
 def test_a_model_without_psi_tells_no_badness(small_config, halves, bounds, episodes):
-    from svaedc.model.reconstruction import renditions
-    from svaedc.model.svae_dc import initialised
+    from svaedc.model.reconstruction import reconstructions
+    from svaedc.model.svae_dc import initialized_model
 
-    model = initialised(replace(small_config, psi_dim=0), halves[0], bounds, seed=0).eval()
-    told = renditions(model, episodes.x[0], episodes.xi[0], episodes.bad[0], 0.5)
+    model = initialized_model(replace(small_config, psi_dim=0), halves[0], bounds, seed=0).eval()
+    told = reconstructions(model, episodes.x[0], episodes.xi[0], episodes.bad[0], 0.5)
     assert all(np.isnan(each.y) for each in told)
 
 

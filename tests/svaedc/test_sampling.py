@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from svaedc.data.samplers import ALONE, STRATA, Balanced, Shard, batches
+from svaedc.data.samplers import ALONE, STRATA, Balanced, WorkerRank, batches
 
 SEED = (0, 0)
 
@@ -31,7 +31,9 @@ def test_batches_from_the_middle_are_those_of_the_whole(count, start):
 
 @given(st.integers(1, 5), st.integers(5, 200), st.integers(1, 64))
 def test_workers_get_equal_disjoint_shares(world, count, batch_size):
-    shares = [list(batches(count, batch_size, Shard(rank, world), SEED, range(7))) for rank in range(world)]
+    shares = [
+        list(batches(count, batch_size, WorkerRank(rank, world), SEED, range(7))) for rank in range(world)
+    ]
     for per_update in zip(*shares, strict=True):
         assert len({len(share) for share in per_update}) == 1
         together = np.concatenate(per_update)
@@ -40,7 +42,7 @@ def test_workers_get_equal_disjoint_shares(world, count, batch_size):
 
 def test_two_workers_together_see_what_one_sees_alone():
     alone = list(batches(100, 32, ALONE, SEED, range(3)))
-    shared = zip(*(batches(100, 32, Shard(rank, 2), SEED, range(3)) for rank in range(2)), strict=True)
+    shared = zip(*(batches(100, 32, WorkerRank(rank, 2), SEED, range(3)) for rank in range(2)), strict=True)
     for whole, parts in zip(alone, shared, strict=True):
         np.testing.assert_array_equal(np.concatenate(parts), whole)
 
@@ -51,7 +53,7 @@ def test_a_dataset_smaller_than_a_batch_is_one_batch():
 
 def test_fewer_episodes_than_workers_are_refused():
     with pytest.raises(ValueError, match="3 workers need at least as many training episodes, got 2"):
-        next(batches(2, 32, Shard(0, 3), SEED, range(1)))
+        next(batches(2, 32, WorkerRank(0, 3), SEED, range(1)))
 
 
 @given(
@@ -95,4 +97,4 @@ def test_a_pass_over_another_number_of_episodes_than_there_are_values_is_refused
 
 def test_a_rank_outside_the_world_is_refused():
     with pytest.raises(ValueError, match="got rank 2 of 2"):
-        Shard(2, 2)
+        WorkerRank(2, 2)

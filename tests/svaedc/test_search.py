@@ -23,15 +23,15 @@ def peak_at(candidates, x):
 def test_gradients_find_the_peak_and_the_pool_its_nearest_candidate():
     candidates, top = as_they_are(problem(2, 300, 0)), [0.23, 0.81]
     value = peak_at(candidates, top)
-    assert ByGradient().maximise(value, candidates, NOTHING, rng()).tolist() == pytest.approx(top, abs=1e-3)
+    assert ByGradient().maximize(value, candidates, NOTHING, rng()).tolist() == pytest.approx(top, abs=1e-3)
     nearest = candidates.x[((candidates.x - top) ** 2).sum(axis=1).argmin()]
-    np.testing.assert_array_equal(OverPool().maximise(value, candidates, NOTHING, rng()), nearest)
+    np.testing.assert_array_equal(OverPool().maximize(value, candidates, NOTHING, rng()), nearest)
 
 
 def test_gradients_go_through_the_model_to_the_controller():
     candidates = by_latents(problem(2, 300, 0), svae_dc)
     value = peak_at(candidates, [0.3, 0.6])
-    x = ByGradient().maximise(value, candidates, NOTHING, rng())
+    x = ByGradient().maximize(value, candidates, NOTHING, rng())
     with torch.no_grad():
         assert value(candidates.features_of(torch.tensor(x[None]).double())).item() > -1e-4
 
@@ -42,7 +42,7 @@ def test_search_stays_in_the_box():
     box = given.within(low, high)
     for search in (OverPool(), ByGradient()):
         for x in (
-            search.maximise(peak_at(box, [0.9, 0.9]), box, NOTHING, rng()),
+            search.maximize(peak_at(box, [0.9, 0.9]), box, NOTHING, rng()),
             search.anywhere(box, NOTHING, rng()),
         ):
             assert (x >= low.numpy() - 1e-6).all()
@@ -55,7 +55,7 @@ def test_gradients_stop_at_controllers_predicted_too_bad():
     screened = as_they_are(problem(2, 300, 0).least_bad(0.3))
     worst_kept = screened.x[:, 0].max()
     for x in (
-        ByGradient().maximise(peak_at(screened, [0.9, 0.5]), screened, NOTHING, rng()),
+        ByGradient().maximize(peak_at(screened, [0.9, 0.5]), screened, NOTHING, rng()),
         *(ByGradient().anywhere(screened, NOTHING, rng(seed)) for seed in range(20)),
     ):
         assert x[0] < worst_kept + 0.02
@@ -64,15 +64,15 @@ def test_gradients_stop_at_controllers_predicted_too_bad():
 def test_controller_found_again_gives_way_to_a_random_one():
     candidates = as_they_are(problem(2, 50, 0))
     value = peak_at(candidates, [2.0, 2.0])
-    corner = ByGradient().maximise(value, candidates, NOTHING, rng())
+    corner = ByGradient().maximize(value, candidates, NOTHING, rng())
     assert corner.tolist() == [1.0, 1.0]
     for history in (NOTHING.append(corner, 0.5), NOTHING.append(corner, float("nan"))):
-        assert not np.array_equal(ByGradient().maximise(value, candidates, history, rng()), corner)
+        assert not np.array_equal(ByGradient().maximize(value, candidates, history, rng()), corner)
 
 
 def test_flat_acquisition_is_no_reason_to_stop():
     candidates = as_they_are(problem(2, 50, 0))
-    x = ByGradient().maximise(lambda phi: 0 * phi.sum(dim=-1), candidates, NOTHING, rng())
+    x = ByGradient().maximize(lambda phi: 0 * phi.sum(dim=-1), candidates, NOTHING, rng())
     assert ((x >= 0) & (x <= 1)).all()
 
 

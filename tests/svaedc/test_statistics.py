@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy import stats
 
-from svaedc.analysis.aggregation import summarise
+from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.statistics import Estimate, bootstrap, holm, proportion, share, sign_flip, student_t
 from svaedc.analysis.summary import Reporting, Row
 
@@ -30,7 +30,7 @@ def two_methods(runs=8, trials=6):
 
 
 def summary(given, reporting=None, seed=0):
-    return summarise(given, reporting or Reporting(broken_below=-0.5), np.random.default_rng(seed))
+    return summarize(given, reporting or Reporting(broken_below=-0.5), np.random.default_rng(seed))
 
 
 def test_student_t_interval_is_that_of_scipy():

@@ -152,4 +152,4 @@ def test_fit_that_never_succeeds_predicts_with_the_starting_hyper_parameters():
 
 def test_scaling_puts_the_limits_at_zero_and_one():
     f = torch.tensor([-2.0, 0.0, 2.0, 4.0], dtype=torch.float64)
-    assert gp.scaled(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]
+    assert gp.scale_objectives(f, (-2.0, 2.0)).tolist() == [0.0, 0.5, 1.0, 1.5]

@@ -7,11 +7,11 @@ import pytest
 import torch
 from torch import nn
 
-from svaedc.data.samplers import Balanced, Shard
+from svaedc.data.samplers import Balanced, WorkerRank
 from svaedc.model.diagnostics import collapse, evaluate
-from svaedc.model.svae_dc import initialised
+from svaedc.model.svae_dc import initialized_model
 from svaedc.training.config import StageSettings, TrainingSettings, Weighting
-from svaedc.training.distributed import Workplace
+from svaedc.training.distributed import DistributedContext
 from svaedc.training.loop import EpochReport, fit
 
 JOINT = StageSettings(
@@ -59,11 +59,11 @@ def test_epochs_are_a_fixed_number_of_updates_and_the_last_one_takes_the_rest(mo
 def test_a_run_resumed_after_any_epoch_ends_with_the_same_bits(
     small_config, halves, bounds, tmp_path, epochs
 ):
-    whole = initialised(small_config, halves[0], bounds, seed=0)
+    whole = initialized_model(small_config, halves[0], bounds, seed=0)
     reports = trained(whole, halves)
     torch.save(reports[epochs - 1].state, tmp_path / "state.pt")
     # Another seed and another position of torch's generator must leave no trace.
-    resumed = initialised(small_config, halves[0], bounds, seed=9)
+    resumed = initialized_model(small_config, halves[0], bounds, seed=9)
     torch.manual_seed(epochs)
     state = torch.load(tmp_path / "state.pt", weights_only=True)
     later = trained(resumed, halves, resume=state)
@@ -109,7 +109,7 @@ def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves
 def test_training_for_generation_brings_generated_trajectories_closer(small_config, halves, bounds):
     measured = {}
     for weight in (0.0, 10.0):
-        model = initialised(small_config, halves[0], bounds, seed=0)
+        model = initialized_model(small_config, halves[0], bounds, seed=0)
         settings = replace(SHORT.with_updates(joint=120, prior=0), epoch_updates=120)
         settings = replace(settings, weighting=Weighting(1.0, 1.0, 0.1, generation=weight))
         [report] = trained(model, halves, settings)
@@ -130,7 +130,7 @@ def test_the_second_stage_changes_only_the_prior_and_never_worsens_its_held_out_
 def test_the_same_seed_gives_the_same_curve_and_another_seed_another(small_config, halves, bounds):
     curves = []
     for seed in (3, 3, 4):
-        model = initialised(small_config, halves[0], bounds, seed)
+        model = initialized_model(small_config, halves[0], bounds, seed)
         curves.append([r.metrics for r in trained(model, halves, replace(SHORT, seed=seed))])
     assert curves[0] == curves[1]
     assert curves[0] != curves[2]
@@ -158,26 +158,26 @@ def test_a_stage_that_no_longer_gets_better_stops_early_and_puts_its_best_epoch_
 
 def test_a_run_that_stopped_early_resumes_to_its_next_stage(small_config, halves, bounds):
     settings = replace(IMPATIENT, prior=replace(JOINT, updates=20))
-    whole = initialised(small_config, halves[0], bounds, seed=0)
+    whole = initialized_model(small_config, halves[0], bounds, seed=0)
     reports = trained(whole, halves, settings)
     last_joint = [r for r in reports if r.stage == "joint"][-1]
     assert last_joint.update == 100
-    resumed = initialised(small_config, halves[0], bounds, seed=9)
+    resumed = initialized_model(small_config, halves[0], bounds, seed=9)
     assert {r.stage for r in trained(resumed, halves, settings, resume=last_joint.state)} == {"prior"}
     assert same(whole, resumed)
 
 
 def test_all_ranks_stop_when_rank_zero_would(model, halves):
-    reports = trained(model, halves, IMPATIENT, workplace=Workplace(agree=lambda _: True))
+    reports = trained(model, halves, IMPATIENT, context=DistributedContext(agree=lambda _: True))
     assert [r.update for r in reports] == [100]
 
 
 def test_bfloat16_learns_what_float32_learns(small_config, halves, bounds):
     measured = {}
     for precision in ("float32", "bfloat16"):
-        model = initialised(small_config, halves[0], bounds, seed=0)
+        model = initialized_model(small_config, halves[0], bounds, seed=0)
         settings = replace(SHORT.with_updates(joint=60, prior=0), epoch_updates=60)
-        trained(model, halves, settings, workplace=Workplace(precision=precision))
+        trained(model, halves, settings, context=DistributedContext(precision=precision))
         assert {value.dtype for value in model.parameters()} == {torch.float32}
         measured[precision] = evaluate(model, halves[1])
     assert measured["bfloat16"] != measured["float32"]
@@ -185,20 +185,20 @@ def test_bfloat16_learns_what_float32_learns(small_config, halves, bounds):
 
 
 def test_densities_are_float32_though_networks_compute_in_bfloat16(model, batch):
-    with Workplace(precision="bfloat16").autocast(torch.device("cpu")):
+    with DistributedContext(precision="bfloat16").autocast(torch.device("cpu")):
         terms = model(*batch)
     assert [term.dtype for term in terms] == [torch.float32] * 3
 
 
 def test_an_unknown_precision_is_refused():
     with pytest.raises(ValueError, match="one of float32, bfloat16, got 'float16'"):
-        Workplace(precision="float16")
+        DistributedContext(precision="float16")
 
 
 def test_balanced_sampling_trains_on_the_rare_episodes_too(small_config, halves, bounds):
     training, _ = halves
     y = np.asarray(training.y[training.rows])
-    models = [initialised(small_config, training, bounds, seed=0) for _ in range(2)]
+    models = [initialized_model(small_config, training, bounds, seed=0) for _ in range(2)]
     trained(models[0], halves)
     trained(models[1], halves, order=Balanced(y))
     assert not same(*models)
@@ -225,16 +225,16 @@ def test_every_stage_is_wrapped_and_all_that_is_wrapped_gets_gradients(model, ha
         wrapped.append(module)
         return module
 
-    trained(model, halves, workplace=Workplace(parallelise=record))
+    trained(model, halves, context=DistributedContext(parallelize=record))
     assert len(wrapped) == 2
     for module in wrapped:
         assert all(value.grad is not None for value in module.parameters())
 
 
 def test_workers_of_different_rank_draw_different_noise(small_config, halves, bounds):
-    models = [initialised(small_config, halves[0], bounds, seed=0) for _ in range(2)]
+    models = [initialized_model(small_config, halves[0], bounds, seed=0) for _ in range(2)]
     for rank, each in enumerate(models):
-        next(fit(each, *halves, SHORT, workplace=Workplace(Shard(rank, 2))))
+        next(fit(each, *halves, SHORT, context=DistributedContext(WorkerRank(rank, 2))))
     assert not same(*models)
 
 

@@ -65,13 +65,13 @@ def test_state_after_a_run_is_that_after_its_halves(f, cut):
 
 
 def test_box_is_longer_where_the_objective_changes_slowly_and_keeps_its_volume():
-    centre = torch.tensor([0.5, 0.5], dtype=torch.float64)
-    low, high = TrustRegion(2, length=0.2).box(centre, torch.tensor([0.5, 2.0], dtype=torch.float64))
+    center = torch.tensor([0.5, 0.5], dtype=torch.float64)
+    low, high = TrustRegion(2, length=0.2).box(center, torch.tensor([0.5, 2.0], dtype=torch.float64))
     assert (high - low).tolist() == pytest.approx([0.1, 0.4])
-    torch.testing.assert_close((low + high) / 2, centre)
+    torch.testing.assert_close((low + high) / 2, center)
 
 
 def test_box_ends_at_the_unit_cube():
-    centre = torch.tensor([0.0, 0.9], dtype=torch.float64)
-    low, high = TrustRegion(2).box(centre, torch.ones(2, dtype=torch.float64))
+    center = torch.tensor([0.0, 0.9], dtype=torch.float64)
+    low, high = TrustRegion(2).box(center, torch.ones(2, dtype=torch.float64))
     assert (low.tolist(), high.tolist()) == ([0.0, pytest.approx(0.5)], [pytest.approx(0.4), 1.0])

@@ -80,7 +80,7 @@ def test_11d_commands_never_leave_the_hardware_s_clamps(numbers):
 
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.sampled_from([0.0, 0.5, 1.0]), min_size=27, max_size=27))
-def test_27d_commands_stay_within_one_and_two_radians_of_their_centres(numbers):
+def test_27d_commands_stay_within_one_and_two_radians_of_their_centers(numbers):
     commands = cpg.cpg_27d(FREE).commands(np.array(numbers, dtype=np.float32), 100).reshape(100, 6, 3)
     left = commands * np.array([1, -1, 1, -1, 1, -1])[:, None]
     assert left[:, :, :2].min() >= -1.0

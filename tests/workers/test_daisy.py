@@ -79,14 +79,14 @@ def test_bullet_keeps_the_inertia_of_the_description(scene):
 def test_combined_solids_obey_the_parallel_axis_theorem():
     ball = daisy_body.Solid(2.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
     other = daisy_body.Solid(2.0, (1.0, 0.0, 0.0), (0.1, 0.1, 0.1))
-    mass, centre, inertia = daisy_body.combined((ball, other))
-    assert (mass, centre) == (4.0, (0.5, 0.0, 0.0))
+    mass, center, inertia = daisy_body.combine((ball, other))
+    assert (mass, center) == (4.0, (0.5, 0.0, 0.0))
     assert inertia == pytest.approx((0.2, 1.2, 1.2))
 
 
-def test_the_centre_of_mass_of_femur_and_tibia_is_the_manufacturer_s():
-    assert daisy_body._femur().centre[0] == pytest.approx(0.251, abs=1e-3)
-    assert daisy_body._tibia(1.0).centre[0] == pytest.approx(0.184, abs=1e-3)
+def test_the_center_of_mass_of_femur_and_tibia_is_the_manufacturer_s():
+    assert daisy_body._femur().center[0] == pytest.approx(0.251, abs=1e-3)
+    assert daisy_body._tibia(1.0).center[0] == pytest.approx(0.184, abs=1e-3)
 
 
 def test_legs_stand_in_their_places(rested):
@@ -154,7 +154,7 @@ def test_it_keeps_standing(rested):
 def test_the_body_s_origin_is_reported_wherever_the_robot_is_turned(rested):
     turn = Rotation.from_euler("xyz", (0.4, -0.7, 1.9))
     _lift(rested, 1.0, tuple(turn.as_quat()))
-    expected = np.array((0.0, 0.0, 1.0)) - turn.apply(daisy_body.body().centre)
+    expected = np.array((0.0, 0.0, 1.0)) - turn.apply(daisy_body.body().center)
     assert rested.observed([rested.record()]).xi[18:21, 0] == pytest.approx(expected, abs=1e-6)
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from workers.collection.forecast import Estimate, Forecast, forecast
+from workers.collection.forecast import Forecast, Prediction, forecast
 from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
 
@@ -41,7 +41,7 @@ def test_equal_shards_foretell_the_job_exactly():
 
 def test_a_job_that_is_done_is_certain():
     found = forecast(reports([8.0, 12.0, 13.0]), 48, actors=1)
-    assert found.hours == Estimate(33.0 * (1 / 3600), 0.0)
+    assert found.hours == Prediction(33.0 * (1 / 3600), 0.0)
 
 
 def test_partial_shards_count_by_their_episodes():

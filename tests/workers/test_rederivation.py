@@ -10,7 +10,7 @@ import pytest
 from cluster.datasets.repair import repair_dataset
 from cluster.errors import UserError
 from workers import setups
-from workers.collection.recompute import broken, drawn, rederive, repair
+from workers.collection.recompute import draw_shards, find_broken, rederive, repair
 from workers.collection.shard import collect_shard, require_same_code, roll_out
 from workers.dataset import schema, shards
 from workers.dataset.folder import MANIFEST, create, open_dataset
@@ -66,7 +66,7 @@ def swap_for_foreign(dataset, shard) -> None:
 
 
 def to_repair(dataset) -> list[Shard]:
-    return [shard for shard, is_broken in broken(dataset) if is_broken]
+    return [shard for shard, is_broken in find_broken(dataset) if is_broken]
 
 
 def found(dataset) -> dict[str, str]:
@@ -172,7 +172,7 @@ def test_a_manifest_that_no_shard_belongs_to_is_the_file_that_is_wrong(dataset):
 def test_a_shard_that_the_disk_does_not_read_is_kept_aside_and_recomputed(dataset, pristine):
     dataset.path(MIDDLE).unlink()
     dataset.path(MIDDLE).symlink_to("/proc/self/mem")
-    assert [shard for shard, is_broken in broken(dataset) if is_broken] == [MIDDLE]
+    assert [shard for shard, is_broken in find_broken(dataset) if is_broken] == [MIDDLE]
     assert repair(FRANKA, dataset, MIDDLE) is Repair.REPLACED
     assert dataset.path(MIDDLE).read_bytes() == pristine.path(MIDDLE).read_bytes()
     [aside] = (dataset.folder / REPLACED).iterdir()
@@ -193,8 +193,8 @@ def test_digests_that_killed_writers_left_over_are_swept_and_those_of_writers_ar
 
 def test_drawn_shards_are_distinct_and_at_most_all(dataset):
     rng = np.random.default_rng(0)
-    assert drawn(dataset, 99, rng) == dataset.shards()
-    assert len(set(drawn(dataset, 2, rng))) == 2
+    assert draw_shards(dataset, 99, rng) == dataset.shards()
+    assert len(set(draw_shards(dataset, 2, rng))) == 2
 
 
 def test_code_that_would_roll_out_other_episodes_is_refused(dataset):

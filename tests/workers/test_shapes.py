@@ -8,7 +8,7 @@ import pytest
 from workers.simulation.scenery import Ground
 from workers.simulation.shapes import cylinder, ground, numbers
 
-COLOURS = tuple((share, share, share) for share in (0.9, 0.8, 0.7, 0.6))
+COLORS = tuple((share, share, share) for share in (0.9, 0.8, 0.7, 0.6))
 BLUE = (0.0, 0.0, 1.0)
 
 
@@ -19,15 +19,15 @@ def _area(surface) -> float:
 
 def test_tiles_cover_the_ground_once_and_end_where_the_task_does():
     model = Ground(0.1, (0.0, 1.5), (-0.45, 0.45), numbered=())
-    areas = {surface.colour: _area(surface) for surface in ground(model, (-1.0, 2.0), (-1.0, 1.0), COLOURS)}
+    areas = {surface.color: _area(surface) for surface in ground(model, (-1.0, 2.0), (-1.0, 1.0), COLORS)}
     assert sum(areas.values()) == pytest.approx(3.0 * 2.0)
-    assert areas[COLOURS[0]] + areas[COLOURS[1]] == pytest.approx(1.5 * 0.9)
-    assert areas[COLOURS[2]] == pytest.approx(areas[COLOURS[3]], rel=0.05)
+    assert areas[COLORS[0]] + areas[COLORS[1]] == pytest.approx(1.5 * 0.9)
+    assert areas[COLORS[2]] == pytest.approx(areas[COLORS[3]], rel=0.05)
 
 
 def test_a_walkway_without_end_fills_what_is_drawn():
     model = Ground(0.5, (-0.5, 0.5), (-math.inf, math.inf), numbered=())
-    inside = ground(model, (-2.0, 2.0), (3.0, 5.0), COLOURS)[:2]
+    inside = ground(model, (-2.0, 2.0), (3.0, 5.0), COLORS)[:2]
     assert sum(map(_area, inside)) == pytest.approx(1.0 * 2.0)
 
 
@@ -44,7 +44,7 @@ def test_every_metre_is_numbered_at_its_place():
 
 def test_a_cylinder_has_the_surface_of_one():
     radius, height = 0.08, 0.22
-    area = sum(_area(part) for part in cylinder(radius, height, COLOURS[:2]))
+    area = sum(_area(part) for part in cylinder(radius, height, COLORS[:2]))
     assert area == pytest.approx(2 * math.pi * radius * (height + radius), rel=0.005)
 
 

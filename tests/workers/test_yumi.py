@@ -79,9 +79,9 @@ def test_a_joint_turns_what_lies_beyond_it_about_its_own_axis(rested, joint):
         frames.append((origin, rotation.apply((0.0, 0.0, 1.0))))
     hand = np.array(rested.arm.state.position)
     assert hand == pytest.approx(origin, abs=1e-5)
-    centre, axis = frames[joint]
+    center, axis = frames[joint]
     moved = _moved(rested, joint, 0.1, steps=10)[joint]
-    expected = centre + Rotation.from_rotvec(moved * axis).apply(hand - centre)
+    expected = center + Rotation.from_rotvec(moved * axis).apply(hand - center)
     assert rested.arm.state.position == pytest.approx(expected, abs=2e-4)
 
 

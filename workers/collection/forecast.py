@@ -14,7 +14,7 @@ LEVEL = 0.9
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Prediction:
     """An expected number; the true one lies within `margin` of it with probability `LEVEL`."""
 
     value: float
@@ -36,10 +36,10 @@ class Forecast:
 
     episodes: int
     actors: int
-    core_hours: Estimate
-    hours: Estimate
-    size: Estimate
-    badness: Estimate
+    core_hours: Prediction
+    hours: Prediction
+    size: Prediction
+    badness: Prediction
 
     def __post_init__(self) -> None:
         """Refuse jobs of nobody or nothing."""
@@ -59,7 +59,7 @@ class Forecast:
         """
         try:
             plain = {
-                name: Estimate(**value) if isinstance(value, Mapping) else value
+                name: Prediction(**value) if isinstance(value, Mapping) else value
                 for name, value in values.items()
             }
             return cls(**plain)  # type: ignore[arg-type]
@@ -88,7 +88,7 @@ def forecast(pilot: Sequence[ShardReport], episodes: int, actors: int) -> Foreca
             f"{episodes} episodes"
         )
 
-    def total(costs: Sequence[float]) -> Estimate:
+    def total(costs: Sequence[float]) -> Prediction:
         return _total(costs, [report.shard.episodes for report in pilot], episodes)
 
     seconds = total([report.seconds for report in pilot])
@@ -97,25 +97,25 @@ def forecast(pilot: Sequence[ShardReport], episodes: int, actors: int) -> Foreca
     return Forecast(
         episodes=episodes,
         actors=actors,
-        core_hours=_scaled(core_seconds, 1 / 3600),
-        hours=_scaled(seconds, 1 / 3600 / actors),
+        core_hours=_scale(core_seconds, 1 / 3600),
+        hours=_scale(seconds, 1 / 3600 / actors),
         size=total([float(report.size) for report in pilot]),
-        badness=_scaled(bad, 1 / episodes),
+        badness=_scale(bad, 1 / episodes),
     )
 
 
-def _total(costs: Sequence[float], sizes: Sequence[int], episodes: int) -> Estimate:
+def _total(costs: Sequence[float], sizes: Sequence[int], episodes: int) -> Prediction:
     """The cost of all episodes, from that of shards with these sizes; what is done is certain."""
     spent, done = math.fsum(costs), sum(sizes)
     left = episodes - done
     if not left:
-        return Estimate(spent, 0.0)
+        return Prediction(spent, 0.0)
     count, others = len(costs), left / (done / len(costs))
     each = np.array(costs) / np.array(sizes)
     spread = float(each.std(ddof=1))
     t = float(stdtrit(count - 1, (1 + LEVEL) / 2))
-    return Estimate(spent * episodes / done, left * t * spread * math.sqrt(1 / count + 1 / others))
+    return Prediction(spent * episodes / done, left * t * spread * math.sqrt(1 / count + 1 / others))
 
 
-def _scaled(estimate: Estimate, factor: float) -> Estimate:
-    return Estimate(estimate.value * factor, estimate.margin * factor)
+def _scale(estimate: Prediction, factor: float) -> Prediction:
+    return Prediction(estimate.value * factor, estimate.margin * factor)

@@ -10,23 +10,23 @@ from jaxtyping import Bool
 from workers.collection.shard import roll_out
 from workers.dataset import schema
 from workers.dataset.folder import Dataset
-from workers.dataset.inventory import lost
+from workers.dataset.inventory import lost_shards
 from workers.dataset.replacement import Repair, replace
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard, sha256
-from workers.dataset.storage.location import fetched
-from workers.dataset.verification import Problem, file_problems
+from workers.dataset.storage.location import fetch
+from workers.dataset.verification import Defect, file_problems
 from workers.setups import Setup
 
 
-def drawn(dataset: Dataset, count: int, rng: np.random.Generator) -> list[Shard]:
+def draw_shards(dataset: Dataset, count: int, rng: np.random.Generator) -> list[Shard]:
     """That many of the dataset's shards, all if there are fewer, in order."""
     shards = dataset.shards()
     chosen = rng.choice(len(shards), size=min(count, len(shards)), replace=False)
     return [shards[int(place)] for place in np.sort(chosen)]
 
 
-def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Problem]:
+def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
     """Roll out a shard again and compare the bytes of the two files; nothing is changed.
 
     Bytes that differ are compared once more as numbers, because another processor may round otherwise, and
@@ -35,21 +35,21 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Problem]:
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
         _write(setup, dataset, shard, again)
-        kept = fetched(dataset.path(shard))
+        kept = fetch(dataset.path(shard))
         if sha256(again) == sha256(kept):
             return []
         try:
             what = _difference(schema.read(kept, dataset.identity), schema.read(again, dataset.identity))
         except ValueError as error:
             what = str(error)
-    return [Problem(shard.name, what)]
+    return [Defect(shard.name, what)]
 
 
-def broken(dataset: Dataset) -> Iterator[tuple[Shard, bool]]:
+def find_broken(dataset: Dataset) -> Iterator[tuple[Shard, bool]]:
     """Every shard there is or was, and whether it must be written anew."""
     for shard in dataset.shards():
         yield shard, bool(file_problems(dataset, shard))
-    for shard in lost(dataset):
+    for shard in lost_shards(dataset):
         yield shard, True
 
 

@@ -24,7 +24,7 @@ LEGS = ("LF", "LM", "LB", "RB", "RM", "RF")
 KINDS = ("base", "shoulder", "elbow")
 COUPLING = 10.0  # w, 1/s
 TIME_STEP = 0.01  # s of the oscillators' time in each control step
-ELBOW_CENTRE = -1.0  # rad, added to the elbows' outputs: the tibia points down
+ELBOW_CENTER = -1.0  # rad, added to the elbows' outputs: the tibia points down
 
 _COMMAND_LEGS = [0, 5, 1, 4, 2, 3]  # oscillators in the order of the robot's legs: LF RF LM RM LB RB
 _SIDES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # left and right legs mirror each other
@@ -111,7 +111,7 @@ class PatternGenerator(Controller):
     def commands(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "horizon 18"]:
         """Joint angles in rad: legs LF RF LM RM LB RB, each with base, shoulder, elbow."""
         left = self._directions * outputs(self._gait(self.values(x)), horizon)
-        left[:, 2] += ELBOW_CENTRE
+        left[:, 2] += ELBOW_CENTER
         angles = (left[:, :, _COMMAND_LEGS] * _SIDES).transpose(0, 2, 1)
         return np.clip(angles, -self._limits, self._limits).reshape(horizon, -1)
 

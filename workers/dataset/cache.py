@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
-from workers.dataset.cache_files import Layout, finish, is_finished, make, opened
+from workers.dataset.cache_files import Layout, finish, is_finished, make, open_arrays
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location
 from workers.dataset.storage.temporary import is_dead, writer
-from workers.rollout import DIVERGED, degrees, sampled
+from workers.rollout import DIVERGED, degrees, stride_steps
 
 _CHANGED = "{} was changed while it was decoded; let whatever repairs or replaces it end, and run this again"
 
@@ -82,7 +82,7 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
     folder = parent / f"{fingerprint[:16]}-stride{stride}"
     if not is_finished(folder):
         _build(dataset, shards, fingerprint, stride, folder)
-    arrays = opened(folder, lambda count: _layout(dataset.identity, stride, count))
+    arrays = open_arrays(folder, lambda count: _layout(dataset.identity, stride, count))
     return TrainingCache(dataset.identity.repeats, **arrays)
 
 
@@ -157,7 +157,7 @@ def _decode(
     """Fill the arrays with the sane episodes of the shards, of each as many as were counted."""
     filled = 0
     for shard, size in sane.items():
-        rows = _sampled(dataset.read(shard), sampled(dataset.identity.horizon, stride))
+        rows = _subsample(dataset.read(shard), stride_steps(dataset.identity.horizon, stride))
         if len(rows["episode"]) != size:
             raise ValueError(_CHANGED.format(dataset.path(shard)))
         _require_finite(rows, dataset.path(shard))
@@ -168,7 +168,7 @@ def _decode(
         array.flush()
 
 
-def _sampled(columns: Columns, steps: slice) -> dict[str, np.ndarray]:
+def _subsample(columns: Columns, steps: slice) -> dict[str, np.ndarray]:
     sane = np.array([stop != DIVERGED for stop in columns.stop])
     return {
         "episode": columns.episode[sane],

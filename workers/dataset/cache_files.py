@@ -36,7 +36,7 @@ def is_finished(folder: Path) -> bool:
     return (folder / READY).exists()
 
 
-def opened(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, np.ndarray]:
+def open_arrays(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, np.ndarray]:
     """The arrays, memory-mapped to be read, once they are found to be those that were made.
 
     Every byte is checked against its file's CRC-32; of a cache from before there were checksums, types and
@@ -52,7 +52,7 @@ def opened(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, np.nda
     try:
         facts = json.loads((folder / READY).read_text())
         layout, checksums = layout_of(facts["episodes"]), facts.get("crc32", {})
-        return {name: _opened(_path(folder, name), *layout[name], checksums.get(name)) for name in layout}
+        return {name: _open_array(_path(folder, name), *layout[name], checksums.get(name)) for name in layout}
     except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise ValueError(
             f"the training cache {folder} is damaged: {error}; delete that folder, and the dataset is "
@@ -60,7 +60,7 @@ def opened(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, np.nda
         ) from error
 
 
-def _opened(path: Path, kind: type[np.generic], shape: tuple[int, ...], checksum: Any) -> np.ndarray:
+def _open_array(path: Path, kind: type[np.generic], shape: tuple[int, ...], checksum: Any) -> np.ndarray:
     if checksum is not None and _checksum(path) != checksum:
         raise ValueError(f"the bytes of {path.name} are not those of its checksum in {READY}")
     array = np.load(path, mmap_mode="r")

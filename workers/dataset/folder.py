@@ -10,10 +10,10 @@ from jaxtyping import Int64
 
 from workers.dataset import shards
 from workers.dataset.identity import Identity
-from workers.dataset.manifest import MANIFEST, begun, manifest_text
+from workers.dataset.manifest import MANIFEST, ensure_manifest, manifest_text
 from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
-from workers.dataset.storage.location import Location, fetched
+from workers.dataset.storage.location import Location, fetch
 from workers.rollout import DIVERGED, Episode
 
 
@@ -57,7 +57,7 @@ class Dataset:
 
     def size(self) -> int:
         """Bytes of the finished shards."""
-        files = (path for path in self.folder.iterdir() if any(shards.named(path.name)))
+        files = (path for path in self.folder.iterdir() if any(shards.shard_named(path.name)))
         return sum(path.stat().st_size for path in files)
 
     def path(self, shard: Shard) -> Location:
@@ -70,7 +70,7 @@ class Dataset:
         Raises:
             ValueError: its file is damaged, of another dataset, or holds other episodes than its name says.
         """
-        columns = read(fetched(self.path(shard)), self.identity)
+        columns = read(fetch(self.path(shard)), self.identity)
         self._require_rows(shard, columns.episode)
         return columns
 
@@ -127,7 +127,7 @@ def create(folder: Location, identity: Identity) -> Dataset:
     """
     folder.mkdir(parents=True, exist_ok=True)
     _require_own_shards(folder, identity)
-    dataset = _opened(folder, begun(folder, manifest_text(identity)))
+    dataset = _open(folder, ensure_manifest(folder, manifest_text(identity)))
     differences = dataset.identity.differences(identity)
     if differences:
         raise ValueError(
@@ -161,10 +161,10 @@ def open_dataset(folder: Location) -> Dataset:
     manifest = folder / MANIFEST
     if not manifest.exists():
         raise ValueError(f"{folder} holds no dataset: there is no {MANIFEST} in it")
-    return _opened(folder, manifest.read_bytes())
+    return _open(folder, manifest.read_bytes())
 
 
-def _opened(folder: Location, manifest: bytes) -> Dataset:
+def _open(folder: Location, manifest: bytes) -> Dataset:
     try:
         return Dataset(folder, Identity.from_json(manifest.decode()))
     except ValueError as error:

@@ -5,27 +5,27 @@ from collections.abc import Iterator
 from workers.dataset.folder import Dataset
 from workers.dataset.manifest import MANIFEST, manifest_text
 from workers.dataset.schema import read_identity
-from workers.dataset.shards import Shard, missing, named, readable_sha256, recorded_digest
+from workers.dataset.shards import Shard, missing, readable_sha256, recorded_digest, shard_named
 from workers.dataset.storage.location import Location, files
 from workers.dataset.storage.temporary import WRITING
-from workers.dataset.verification import Problem
+from workers.dataset.verification import Defect
 
 _DIGEST = ".sha256"
 
 
-def inventory(dataset: Dataset) -> Iterator[Problem]:
+def inventory(dataset: Dataset) -> Iterator[Defect]:
     """What is wrong with the folder, beside what is in its shards; nothing is changed or deleted."""
     yield from _manifest_problems(dataset)
     for path in files(dataset.folder, "*.parquet"):
-        if not list(named(path.name)):
-            yield Problem(path.name, f"no shard has such a name, {_whose(dataset, path)}")
-    for shard in lost(dataset):
-        yield Problem(shard.name, "it is missing: only its .sha256 file is there")
-    for shard in left_over(dataset):
-        yield Problem(shard.name + _DIGEST, "it is left over: the episodes of its shard are in other files")
+        if not list(shard_named(path.name)):
+            yield Defect(path.name, f"no shard has such a name, {_whose(dataset, path)}")
+    for shard in lost_shards(dataset):
+        yield Defect(shard.name, "it is missing: only its .sha256 file is there")
+    for shard in leftover_shards(dataset):
+        yield Defect(shard.name + _DIGEST, "it is left over: the episodes of its shard are in other files")
 
 
-def estranged(dataset: Dataset) -> list[str]:
+def manifest_differences(dataset: Dataset) -> list[str]:
     """What `dataset.json` and the shards differ in, if no shard is of it: it was changed, and not they."""
     found: list[str] = []
     for shard in dataset.shards():
@@ -39,7 +39,7 @@ def estranged(dataset: Dataset) -> list[str]:
     return found
 
 
-def lost(dataset: Dataset) -> list[Shard]:
+def lost_shards(dataset: Dataset) -> list[Shard]:
     """Shards of which only the digest is there, and whose episodes are not all in other files.
 
     They were deleted, or their writer was killed between the two names.
@@ -47,7 +47,7 @@ def lost(dataset: Dataset) -> list[Shard]:
     return [shard for shard, is_covered in _digests_alone(dataset) if not is_covered]
 
 
-def left_over(dataset: Dataset) -> list[Shard]:
+def leftover_shards(dataset: Dataset) -> list[Shard]:
     """Shards of which only the digest is there, while other files hold their episodes."""
     return [shard for shard, is_covered in _digests_alone(dataset) if is_covered]
 
@@ -59,19 +59,19 @@ def sweep_digests(dataset: Dataset) -> int:
     """
     writing = [path.name for path in (dataset.folder / WRITING).glob("*")]
     swept = 0
-    for shard in left_over(dataset):
+    for shard in leftover_shards(dataset):
         if not any(name.startswith(f"{shard.name}.") for name in writing):
             (dataset.folder / (shard.name + _DIGEST)).unlink(missing_ok=True)
             swept += 1
     return swept
 
 
-def _manifest_problems(dataset: Dataset) -> Iterator[Problem]:
+def _manifest_problems(dataset: Dataset) -> Iterator[Defect]:
     if (dataset.folder / MANIFEST).read_text() != manifest_text(dataset.identity):
-        yield Problem(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
-    differences = estranged(dataset)
+        yield Defect(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
+    differences = manifest_differences(dataset)
     if differences:
-        yield Problem(
+        yield Defect(
             MANIFEST,
             f"no shard belongs to it; they differ in {'; '.join(differences)}. Remove it: `svaedc collect` "
             "with the options of the shards writes it anew",
@@ -97,9 +97,9 @@ def _digests_alone(dataset: Dataset) -> list[tuple[Shard, bool]]:
         shard
         for name in sorted(there)
         if name.endswith(_DIGEST) and name.removesuffix(_DIGEST) not in there
-        for shard in named(name.removesuffix(_DIGEST))
+        for shard in shard_named(name.removesuffix(_DIGEST))
     ]
-    present = [shard for name in there for shard in named(name)]
+    present = [shard for name in there for shard in shard_named(name)]
     stop = max((shard.stop for shard in alone), default=0)
     uncovered = list(missing(present, stop, dataset.identity.episodes_per_shard))
     return [

@@ -17,13 +17,13 @@ def manifest_text(identity: Identity) -> str:
     return json.dumps(json.loads(identity.to_json()), indent=2) + "\n"
 
 
-def begun(folder: Location, text: str) -> bytes:
+def ensure_manifest(folder: Location, text: str) -> bytes:
     """Write the manifest unless there is one; returns the one that counts, of two writers the first's."""
     manifest = folder / MANIFEST
     if manifest.exists():
         return manifest.read_bytes()
     if isinstance(folder, ObjectPath):
-        return _claimed(folder, text)
+        return _claim(folder, text)
     with temporary_file(folder, MANIFEST) as temporary:
         temporary.write_text(text)
         synchronise(temporary)
@@ -31,7 +31,7 @@ def begun(folder: Location, text: str) -> bytes:
     return manifest.read_bytes()
 
 
-def _claimed(folder: ObjectPath, text: str) -> bytes:
+def _claim(folder: ObjectPath, text: str) -> bytes:
     """The same where no write can be made to depend on there being nothing.
 
     A writer first lays a claim in a name of its own, and goes on only if nobody else's claim is of another

@@ -13,7 +13,7 @@ _FIRST = -(2**15)
 Stored = Float32[np.ndarray, "*n obs time"] | Int16[np.ndarray, "*n obs time"]
 
 
-def stored(xi: Float32[np.ndarray, "*n obs time"], identity: Identity) -> Stored:
+def encode(xi: Float32[np.ndarray, "*n obs time"], identity: Identity) -> Stored:
     """Trajectories as the identity stores them: unchanged, or the nearest of 2^16 values of each channel.
 
     Raises:
@@ -28,7 +28,7 @@ def stored(xi: Float32[np.ndarray, "*n obs time"], identity: Identity) -> Stored
     return (np.clip(place, 0, CODES - 1) + _FIRST).astype(np.int16)
 
 
-def restored(values: Stored, identity: Identity) -> Float32[np.ndarray, "*n obs time"]:
+def decode(values: Stored, identity: Identity) -> Float32[np.ndarray, "*n obs time"]:
     """Trajectories from what is stored: low + (code + 32768) · (high − low) / 65535."""
     if identity.storage == "float32":
         return values
@@ -49,7 +49,7 @@ def error_bound(identity: Identity) -> Float64[np.ndarray, " obs"]:
     return (high - low) / (CODES - 1) / 2 + np.spacing(magnitude).astype(np.float64) / 2
 
 
-def described(identity: Identity) -> dict[str, Any]:
+def describe_encoding(identity: Identity) -> dict[str, Any]:
     """What a stranger must know to read the codes; nothing for plain numbers."""
     if identity.storage == "float32":
         return {}

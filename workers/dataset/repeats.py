@@ -75,7 +75,7 @@ def share(values: Float64[np.ndarray, "controllers repeats"]) -> float:
 def error_bounds(xi: Float32[np.ndarray, "controllers repeats obs time"]) -> tuple[float, float]:
     """The two numbers of `Irreducible.xi`, of trajectories in any units."""
     ratios = [
-        (_own(channel) / spread, _others(channel) / spread)
+        (_within_controllers(channel) / spread, _between_controllers(channel) / spread)
         for channel in np.moveaxis(xi, 2, 0)
         if (spread := float(np.abs(channel - np.median(channel, axis=(0, 1))).mean())) > 0.0
     ]
@@ -83,11 +83,11 @@ def error_bounds(xi: Float32[np.ndarray, "controllers repeats obs time"]) -> tup
     return float(low), float(high)
 
 
-def _own(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
+def _within_controllers(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
     return float(np.abs(channel - np.median(channel, axis=1, keepdims=True)).mean())
 
 
-def _others(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
+def _between_controllers(channel: Float32[np.ndarray, "controllers repeats time"]) -> float:
     errors = [
         np.abs(channel[:, one] - np.median(np.delete(channel, one, axis=1), axis=1)).mean()
         for one in range(channel.shape[1])

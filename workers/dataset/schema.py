@@ -15,7 +15,7 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 
 from workers.dataset.identity import Identity
 from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_in, require_own
-from workers.dataset.quantisation import described, restored, stored
+from workers.dataset.quantisation import decode, describe_encoding, encode
 from workers.dataset.storage.location import Location, source
 from workers.dataset.storage.s3 import refusal
 from workers.rollout import Episode
@@ -97,7 +97,7 @@ def schema(identity: Identity) -> pa.Schema:
             {
                 "xi": ["observation", "time"],
                 "xi_shape": [len(identity.observation), identity.horizon],
-                **described(identity),
+                **describe_encoding(identity),
                 "bad": _GRADED if _is_graded(identity) else _BITS,
             }
         ),
@@ -128,7 +128,7 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
     arrays = {
         "episode": pa.array(np.arange(start, start + len(episodes))),
         "x": _lists([episode.x for episode in episodes], kinds["x"]),
-        "xi": _lists([stored(episode.xi, identity) for episode in episodes], kinds["xi"]),
+        "xi": _lists([encode(episode.xi, identity) for episode in episodes], kinds["xi"]),
         "bad": _lists([episode.bad for episode in episodes], kinds["bad"]),
         "y": pa.array([episode.y for episode in episodes], type=kinds["y"]),
         "f": pa.array([episode.f for episode in episodes], type=kinds["f"]),
@@ -178,7 +178,7 @@ def read_identity(path: Location) -> Identity:
     Raises:
         ValueError: when the file is no Parquet file of this project.
     """
-    with _damage_named(path):
+    with _name_damage(path):
         metadata = pq.read_schema(source(path)).metadata or {}
     return identity_in(path, metadata)
 
@@ -194,7 +194,7 @@ def read(path: Location, identity: Identity) -> Columns:
     return Columns(
         episode=table["episode"].to_numpy(),
         x=_dense(table["x"], (len(identity.parameters),)),
-        xi=restored(_dense(table["xi"], shape), identity),
+        xi=decode(_dense(table["xi"], shape), identity),
         bad=_dense(table["bad"], (identity.horizon,)),
         y=table["y"].to_numpy(),
         f=table["f"].to_numpy(),
@@ -221,7 +221,7 @@ def read_outcomes(path: Location, identity: Identity) -> Outcomes:
 
 def _table(path: Location, identity: Identity, names: list[str]) -> pa.Table:
     """Columns of a file of this dataset, every page of them checked against its checksum."""
-    with _damage_named(path):
+    with _name_damage(path):
         file = pq.ParquetFile(source(path), page_checksum_verification=True, pre_buffer=True)
         require_own(path, file.schema_arrow.metadata or {}, identity)
         if not file.schema_arrow.equals(schema(identity)):
@@ -235,7 +235,7 @@ def read_stops(path: Location, identity: Identity) -> tuple[str, ...]:
 
 
 @contextmanager
-def _damage_named(path: Location) -> Iterator[None]:
+def _name_damage(path: Location) -> Iterator[None]:
     """A store that is away says nothing about the file."""
     try:
         yield

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workers.dataset.storage.atomic import link, move, synchronise, temporary_file
-from workers.dataset.storage.location import Location, fetched
+from workers.dataset.storage.location import Location, fetch
 from workers.dataset.storage.s3 import StoreError
 from workers.dataset.storage.temporary import WRITING, is_dead
 
@@ -45,10 +45,10 @@ class Shard:
 
 def present(folder: Location) -> list[Shard]:
     """The finished shards of a dataset, in order."""
-    return sorted(shard for path in folder.iterdir() for shard in named(path.name))
+    return sorted(shard for path in folder.iterdir() for shard in shard_named(path.name))
 
 
-def named(name: str) -> Iterator[Shard]:
+def shard_named(name: str) -> Iterator[Shard]:
     """The shard that a file name stands for; none for a name of another kind."""
     match = _NAME.fullmatch(name)
     if match and int(match[1]) < int(match[2]):
@@ -119,7 +119,7 @@ def recorded_digests(folder: Location, shards: Iterable[Shard]) -> Iterator[str]
 def sha256(path: Location) -> str:
     """SHA-256 of a file's bytes."""
     digest = hashlib.sha256()
-    with fetched(path).open("rb") as file:
+    with fetch(path).open("rb") as file:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()

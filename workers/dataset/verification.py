@@ -11,7 +11,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
-from workers.dataset.storage.location import Location, fetched
+from workers.dataset.storage.location import Location, fetch
 from workers.physics import PhysicsRanges
 from workers.randomness import generator
 from workers.rollout import DIVERGED, degrees
@@ -19,14 +19,14 @@ from workers.tasks.stop import STOPPED
 
 
 @dataclass(frozen=True)
-class Problem:
+class Defect:
     """Something wrong with one file."""
 
     file: str
     what: str
 
 
-def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Problem]]]:
+def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Defect]]]:
     """Check every shard in turn, and yield it with what is wrong with it; nothing is changed or deleted.
 
     Episodes between shards that nobody has collected yet are no fault of a file: see `gaps`.
@@ -37,22 +37,22 @@ def verify(dataset: Dataset) -> Iterator[tuple[Shard, list[Problem]]]:
         yield shard, beside + file_problems(dataset, shard)
 
 
-def overlaps(dataset: Dataset) -> list[Problem]:
+def overlaps(dataset: Dataset) -> list[Defect]:
     """The shards that hold episodes once more; each may be whole in itself."""
     found, reached = [], 0
     for shard in dataset.shards():
         if shard.start < reached:
             what = f"it overlaps: episodes below {reached} are in files before it"
-            found.append(Problem(shard.name, what))
+            found.append(Defect(shard.name, what))
         reached = max(reached, shard.stop)
     return found
 
 
-def file_problems(dataset: Dataset, shard: Shard) -> list[Problem]:
+def file_problems(dataset: Dataset, shard: Shard) -> list[Defect]:
     """What is wrong with a shard in itself, whatever lies beside it."""
-    path = fetched(dataset.path(shard))
+    path = fetch(dataset.path(shard))
     found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
-    return [Problem(shard.name, what) for what in found]
+    return [Defect(shard.name, what) for what in found]
 
 
 def gaps(dataset: Dataset) -> Iterator[Shard]:

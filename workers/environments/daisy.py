@@ -34,7 +34,7 @@ ROBOT = HexapodModel(
     feet=tuple(f"{leg}_elbow" for leg in LEGS),
     home=HOME,
     height=0.305,
-    centre=daisy_body.body().centre,
+    center=daisy_body.body().center,
     torques=tuple(daisy_body.TORQUE.values()) * len(LEGS),
     speeds=UNLIMITED * len(LEGS),
     stiffness=0.1,
@@ -133,9 +133,9 @@ class Daisy(Environment):
         """ξ in the order of `observation`; signals: `joint_speeds` [18, T] and `elbow_contact` [T]."""
         columns = np.frombuffer(b"".join(records)).reshape(len(records), -1).T
         angles, speeds = columns[:BODY], columns[BODY : 2 * BODY]
-        centre, quaternion, contact = columns[2 * BODY : -5], columns[-5:-1], columns[-1]
+        center, quaternion, contact = columns[2 * BODY : -5], columns[-5:-1], columns[-1]
         axes = first_two_axes(quaternion.T)
-        origin = centre - _turned(axes, self._robot_model.centre)
+        origin = center - _rotate(axes, self._robot_model.center)
         return Observed(
             xi=np.concatenate([angles, origin, axes]).astype(np.float32),
             signals={"joint_speeds": speeds, "elbow_contact": contact != 0.0},
@@ -146,7 +146,7 @@ class Daisy(Environment):
         self._world.close()
 
 
-def _turned(
+def _rotate(
     axes: Float[np.ndarray, "6 time"], vector: tuple[float, float, float]
 ) -> Float[np.ndarray, "3 time"]:
     """The vector under the rotations whose first two columns are given."""

@@ -32,10 +32,10 @@ JOINT_DAMPING = 0.5  # N·m·s/rad
 
 MOUNT_PLANE = -0.05  # m below the origin of the body, which is the centre of its box
 CHASSIS_MASS, CHASSIS_BOX = 5.0, (0.24, 0.36, 0.10)  # kg; m, the sizes assumed
-CHASSIS_CENTRE = (0.0, 0.050, 0.075)  # m, of mass, from the mounts' plane
-ACTUATOR_MASS, ACTUATOR_CENTRE = 0.480, 0.0242  # kg, X8-9; m above the mounts' plane
+CHASSIS_CENTER = (0.0, 0.050, 0.075)  # m, of mass, from the mounts' plane
+ACTUATOR_MASS, ACTUATOR_CENTER = 0.480, 0.0242  # kg, X8-9; m above the mounts' plane
 ACTUATOR_INERTIA = (2.46e-4, 3.80e-4, 4.63e-4)  # kg·m²
-COXA_MASS, COXA_CENTRE = 0.715, (0.0, 0.0, 0.045)  # bracket and X8-16 body
+COXA_MASS, COXA_CENTER = 0.715, (0.0, 0.0, 0.045)  # bracket and X8-16 body
 TUBE_MASS, TUBE_LENGTH, TUBE_RADIUS = 0.402, 0.325, 0.016
 TUBE_ASIDE = 0.020  # m beside the actuator's output
 FOOT_MASS, FOOT_RADIUS = 0.060, 0.025  # radius assumed: tube and rubber
@@ -50,19 +50,19 @@ class Solid(NamedTuple):
     """Mass in kg, centre of mass in m, and principal moments of inertia about it in kg·m²."""
 
     mass: float
-    centre: Vector
+    center: Vector
     inertia: Vector
 
 
-def combined(parts: tuple[Solid, ...]) -> Solid:
+def combine(parts: tuple[Solid, ...]) -> Solid:
     """Several solids as one, by the parallel axis theorem; products of inertia are left out."""
     masses = np.array([part.mass for part in parts])
-    centres = np.array([part.centre for part in parts])
-    centre = masses @ centres / masses.sum()
-    squares = (centres - centre) ** 2
+    centers = np.array([part.center for part in parts])
+    center = masses @ centers / masses.sum()
+    squares = (centers - center) ** 2
     steiner = masses @ (squares.sum(axis=1, keepdims=True) - squares)
     inertia = np.array([part.inertia for part in parts]).sum(axis=0) + steiner
-    return Solid(float(masses.sum()), _vector(centre), _vector(inertia))
+    return Solid(float(masses.sum()), _vector(center), _vector(inertia))
 
 
 def body() -> Solid:
@@ -70,23 +70,23 @@ def body() -> Solid:
     wide, long, high = CHASSIS_BOX
     squares = (long**2 + high**2, wide**2 + high**2, wide**2 + long**2)
     inertia = _vector(CHASSIS_MASS / 12 * np.array(squares))
-    x, y, z = CHASSIS_CENTRE
+    x, y, z = CHASSIS_CENTER
     chassis = Solid(CHASSIS_MASS, (x, y, z + MOUNT_PLANE), inertia)
     hips = (
-        Solid(ACTUATOR_MASS, (*_mount(leg), ACTUATOR_CENTRE + MOUNT_PLANE), ACTUATOR_INERTIA) for leg in LEGS
+        Solid(ACTUATOR_MASS, (*_mount(leg), ACTUATOR_CENTER + MOUNT_PLANE), ACTUATOR_INERTIA) for leg in LEGS
     )
-    return combined((chassis, *hips))
+    return combine((chassis, *hips))
 
 
 def _femur() -> Solid:
     end = Solid(ACTUATOR_MASS, (TUBE_LENGTH, 0.0, 0.0), ACTUATOR_INERTIA)
-    return combined((_tube(0.0), end))
+    return combine((_tube(0.0), end))
 
 
 def _tibia(side: float) -> Solid:
     ball = 0.4 * FOOT_MASS * FOOT_RADIUS**2
     foot = Solid(FOOT_MASS, (TUBE_LENGTH, -side * TUBE_ASIDE, 0.0), (ball, ball, ball))
-    return combined((_tube(-side * TUBE_ASIDE), foot))
+    return combine((_tube(-side * TUBE_ASIDE), foot))
 
 
 def _tube(aside: float) -> Solid:
@@ -97,7 +97,7 @@ def _tube(aside: float) -> Solid:
 
 def _coxa() -> Solid:
     scale = COXA_MASS / ACTUATOR_MASS
-    return Solid(COXA_MASS, COXA_CENTRE, _vector(scale * np.array(ACTUATOR_INERTIA)))
+    return Solid(COXA_MASS, COXA_CENTER, _vector(scale * np.array(ACTUATOR_INERTIA)))
 
 
 def _mount(leg: str) -> tuple[float, float]:
@@ -129,7 +129,7 @@ def _leg(leg: str) -> list[str]:
     housing = _part((TUBE_LENGTH, 0.0, 0.0), _sphere(HOUSING_RADIUS), ACTUATOR)
     return [
         _joint(leg, "base", "body", (mount, radians(degrees)), (0.0, 0.0, 1.0)),
-        _link(f"{leg}_coxa", _coxa(), _part(COXA_CENTRE, _sphere(HOUSING_RADIUS), ACTUATOR)),
+        _link(f"{leg}_coxa", _coxa(), _part(COXA_CENTER, _sphere(HOUSING_RADIUS), ACTUATOR)),
         _joint(leg, "shoulder", f"{leg}_coxa", ((0.0, side * 0.0225, 0.055), 0.0), (0.0, side, 0.0)),
         _link(f"{leg}_femur", _femur(), _tube_part(-side * TUBE_ASIDE) + housing),
         _joint(leg, "elbow", f"{leg}_femur", ((TUBE_LENGTH, -side * 0.045, 0.0), 0.0), (0.0, -side, 0.0)),
@@ -158,7 +158,7 @@ def _joint(leg: str, kind: str, parent: str, origin: tuple[Vector, float], axis:
 def _link(name: str, solid: Solid, parts: str) -> str:
     xx, yy, zz = solid.inertia
     return (
-        f'<link name="{name}"><inertial><origin xyz="{_numbers(solid.centre)}"/>'
+        f'<link name="{name}"><inertial><origin xyz="{_numbers(solid.center)}"/>'
         f'<mass value="{solid.mass:.12g}"/><inertia ixx="{xx:.12g}" iyy="{yy:.12g}" izz="{zz:.12g}"'
         f' ixy="0" ixz="0" iyz="0"/></inertial>{parts}</link>'
     )
@@ -169,18 +169,18 @@ def _tube_part(aside: float) -> str:
     return _part((TUBE_LENGTH / 2, aside, 0.0), capsule, TUBE, pitch=pi / 2)
 
 
-def _part(place: Vector, shape: str, colour: str, pitch: float = 0.0) -> str:
+def _part(place: Vector, shape: str, color: str, pitch: float = 0.0) -> str:
     """The shape, to touch and to see."""
     inside = _shape(place, shape, pitch)
-    return f"<visual>{inside}{_material(colour)}</visual><collision>{inside}</collision>"
+    return f"<visual>{inside}{_material(color)}</visual><collision>{inside}</collision>"
 
 
 def _shape(place: Vector, shape: str, pitch: float = 0.0) -> str:
     return f'<origin xyz="{_numbers(place)}" rpy="0 {pitch:.12g} 0"/><geometry>{shape}</geometry>'
 
 
-def _material(colour: str) -> str:
-    return f'<material name="{colour}"><color rgba="{colour} 1"/></material>'
+def _material(color: str) -> str:
+    return f'<material name="{color}"><color rgba="{color} 1"/></material>'
 
 
 def _sphere(radius: float) -> str:

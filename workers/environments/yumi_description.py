@@ -125,22 +125,22 @@ def _body() -> Iterator[str]:
     for joint, angle, capsule in zip(left, LEFT_REST, CAPSULES, strict=True):
         origin = origin + rotation.apply(joint.xyz)
         rotation = rotation * Rotation.from_euler("xyz", joint.rpy) * Rotation.from_rotvec((0, 0, angle))
-        centre, turn = capsule.frame
+        center, turn = capsule.frame
         euler = (rotation * turn).as_euler("xyz")
-        yield from _shape("visual", _capsule(capsule), origin + rotation.apply(centre), euler)
+        yield from _shape("visual", _capsule(capsule), origin + rotation.apply(center), euler)
     yield "  </link>"
 
 
 def _link(name: str, capsule: Capsule, mass: float) -> Iterator[str]:
-    centre, turn = capsule.frame
+    center, turn = capsule.frame
     across, along = capsule.moments(mass)
     is_flange = capsule is CAPSULES[-1]
     geometry = _FLANGE if is_flange else _capsule(capsule)
     rpy = turn.as_euler("xyz")
     yield f'  <link name="{name}">'
-    yield from _inertial(centre, rpy, mass, (across, across, along))
-    yield from _shape("visual", geometry, centre, rpy)
-    yield from _shape("collision", geometry, centre, rpy)
+    yield from _inertial(center, rpy, mass, (across, across, along))
+    yield from _shape("visual", geometry, center, rpy)
+    yield from _shape("collision", geometry, center, rpy)
     yield "  </link>"
 
 

@@ -58,7 +58,7 @@ class MotionLedger:
         if not self.path.exists():
             return []
         # A crash can leave half a line, even one that a later append closed with a newline.
-        return [entry for line in self.path.read_bytes().split(b"\n") if (entry := _parsed(line)) is not None]
+        return [entry for line in self.path.read_bytes().split(b"\n") if (entry := _parse(line)) is not None]
 
     def _append(self, entry: dict[str, Any]) -> None:
         line = json.dumps(entry, sort_keys=True, allow_nan=False).encode() + b"\n"
@@ -75,7 +75,7 @@ class MotionLedger:
             _sync_folder(self.path.parent)
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
+def _parse(line: bytes) -> dict[str, Any] | None:
     try:
         entry = json.loads(line)
     except ValueError:

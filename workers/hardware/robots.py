@@ -55,7 +55,7 @@ def find(name: str) -> Robot:
     Raises:
         LookupError: when there is none; the message names the nearest.
     """
-    return ROBOTS[setups.known(name, "robot", ROBOTS)]
+    return ROBOTS[setups.require_known(name, "robot", ROBOTS)]
 
 
 def stands_in_for(setup: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
-from workers.setups.setup import Setup, known
+from workers.setups.setup import Setup, require_known
 
 SETUPS = {
     "franka": "workers.setups.franka:franka",
@@ -33,24 +33,24 @@ def load(name: str) -> Setup:
         LookupError: there is neither (it names the nearest), or the module is not as it must be.
     """
     if name in SETUPS or not _is_module(name):
-        module, _, function = SETUPS[_shipped(name)].partition(":")
+        module, _, function = SETUPS[_shipped_name(name)].partition(":")
         return getattr(import_module(module), function)()
-    made = getattr(imported(name), "setup", lambda: None)()
+    made = getattr(import_user_module(name), "setup", lambda: None)()
     if not isinstance(made, Setup):
         raise LookupError(
             f"module {name!r} must offer a function setup() that returns a workers.setups.Setup"
         )
-    return replace(made, name=name, code=file_digest(imported(name)))
+    return replace(made, name=name, code=file_digest(import_user_module(name)))
 
 
-def _shipped(name: str) -> str:
+def _shipped_name(name: str) -> str:
     try:
-        return known(name, "setup", SETUPS)
+        return require_known(name, "setup", SETUPS)
     except LookupError as error:
         raise LookupError(f"{error.args[0]}; nor is there a module of that name to import") from error
 
 
-def imported(name: str) -> ModuleType:
+def import_user_module(name: str) -> ModuleType:
     """A user's module; one that cannot be imported raises `LookupError` with the reason."""
     try:
         return import_module(name)

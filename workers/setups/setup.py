@@ -96,15 +96,15 @@ class Setup:
             ValueError: when a range is not written as `workers.physics.ranges` reads it, or is impossible.
         """
         if "=" not in level:
-            return self.gaps[known(level, "gap level", self.gaps)]
+            return self.gaps[require_known(level, "gap level", self.gaps)]
         fixed = {name: (value, value) for name, value in self.physics.middle().items()}
         written = ranges(level).intervals
         for name in written:
-            known(name, "physics parameter", fixed)
+            require_known(name, "physics parameter", fixed)
         return PhysicsRanges({**fixed, **written})
 
 
-def known(name: str, kind: str, names: Mapping[str, object]) -> str:
+def require_known(name: str, kind: str, names: Mapping[str, object]) -> str:
     """The name itself if it is one of the names; otherwise a `LookupError` that suggests the nearest."""
     if name in names:
         return name

@@ -5,7 +5,7 @@ import inspect
 from dataclasses import replace
 from typing import Any
 
-from workers.setups.registry import file_digest, imported
+from workers.setups.registry import file_digest, import_user_module
 from workers.setups.setup import Setup
 from workers.tasks.own_bad import OwnBad, marked_conditions
 
@@ -37,7 +37,7 @@ def _function(name: str) -> Any:
     module_name, _, function_name = name.partition(":")
     if not module_name or not function_name:
         raise LookupError(f"G_bad must be named as module:function, got {name!r}")
-    module = imported(module_name)
+    module = import_user_module(module_name)
     function = getattr(module, function_name, None)
     if not inspect.isfunction(function):
         there = [key for key, value in vars(module).items() if inspect.isfunction(value)]

@@ -170,12 +170,14 @@ class Arm:
     def _read(self) -> ArmState:
         joints = pybullet.getJointStates(self.body, self._joints, self._client)
         # With velocities and forward kinematics: without it Bullet answers with the poses of one step before.
-        centre, _, _, _, origin, orientation, velocity, spin = pybullet.getLinkState(
+        center, _, _, _, origin, orientation, velocity, spin = pybullet.getLinkState(
             self.body, self._hand, 1, 1, self._client
         )
         angles, speeds, _, _ = zip(*joints, strict=True)
         self._all_angles = angles + self._finger_rest
-        return ArmState(angles, speeds, origin, orientation, _carried(velocity, spin, centre, origin), spin)
+        return ArmState(
+            angles, speeds, origin, orientation, _shift_velocity(velocity, spin, center, origin), spin
+        )
 
     def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
         """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
@@ -197,9 +199,9 @@ class Arm:
         return bool(contacts) and any(c[_LINK] >= 0 and c[_DISTANCE] < 0.0 for c in contacts)
 
 
-def _carried(velocity: Vector, spin: Vector, centre: Vector, origin: Vector) -> Vector:
+def _shift_velocity(velocity: Vector, spin: Vector, center: Vector, origin: Vector) -> Vector:
     """Velocity v + ω × (origin − centre) of a link's origin, from that of its centre of mass."""
     vx, vy, vz = velocity
     wx, wy, wz = spin
-    dx, dy, dz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
+    dx, dy, dz = origin[0] - center[0], origin[1] - center[1], origin[2] - center[2]
     return (vx + wy * dz - wz * dy, vy + wz * dx - wx * dz, vz + wx * dy - wy * dx)

@@ -38,7 +38,7 @@ class HexapodModel:
     feet: tuple[str, ...]
     home: tuple[float, ...]
     height: float
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     torques: tuple[float, ...]
     speeds: tuple[float, ...]
     stiffness: float
@@ -106,7 +106,7 @@ class Hexapod:
         model, client = self._model, self._client
         for joint, angle in zip(self._joints, model.home, strict=True):
             pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=client)
-        x, y, z = model.centre  # Bullet places the centre of mass
+        x, y, z = model.center  # Bullet places the centre of mass
         start = (x, y, z + model.height)
         pybullet.resetBasePositionAndOrientation(self.body, start, _UPRIGHT, physicsClientId=client)
         pybullet.resetBaseVelocity(self.body, _REST, _REST, physicsClientId=client)

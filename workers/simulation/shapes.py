@@ -41,7 +41,7 @@ class Quad(NamedTuple):
 class Surface(NamedTuple):
     """Quads of one colour (red, green, blue, from 0 to 1)."""
 
-    colour: Point
+    color: Point
     quads: tuple[Quad, ...]
 
     def vertices(self) -> list[Point]:
@@ -58,7 +58,7 @@ class Surface(NamedTuple):
 
 
 def ground(
-    model: Ground, x: Interval, y: Interval, colours: tuple[Point, Point, Point, Point]
+    model: Ground, x: Interval, y: Interval, colors: tuple[Point, Point, Point, Point]
 ) -> list[Surface]:
     """The part of a ground over that rectangle; tiles are cut where its lighter part ends.
 
@@ -66,7 +66,7 @@ def ground(
         model: the ground.
         x: at least this extent, in m.
         y: the same along y.
-        colours: of both kinds of tiles where the task happens, then of both elsewhere.
+        colors: of both kinds of tiles where the task happens, then of both elsewhere.
     """
     quads: tuple[list[Quad], ...] = ([], [], [], [])
     columns = list(pairwise(_cuts(model.tile, x, model.x)))
@@ -77,7 +77,7 @@ def ground(
             inside = model.x[0] < middle[0] < model.x[1] and model.y[0] < middle[1] < model.y[1]
             odd = sum(math.floor(m / model.tile) for m in middle) % 2
             quads[odd if inside else 2 + odd].append(flat(left, right, near, far, 0.0))
-    return [Surface(colour, tuple(part)) for colour, part in zip(colours, quads, strict=True) if part]
+    return [Surface(color, tuple(part)) for color, part in zip(colors, quads, strict=True) if part]
 
 
 def flat(left: float, right: float, near: float, far: float, height: float) -> Quad:
@@ -87,15 +87,15 @@ def flat(left: float, right: float, near: float, far: float, height: float) -> Q
     return Quad(corners, (up, up, up, up))
 
 
-def numbers(model: Ground, y: Interval, colour: Point) -> list[Surface]:
+def numbers(model: Ground, y: Interval, color: Point) -> list[Surface]:
     """Every whole metre of y, written on the ground to be read by one who looks along +y."""
     metres = range(math.ceil(y[0]), math.floor(y[1]) + 1)
     places = [(metre, x) for metre in metres for x in model.numbered]
-    quads = [quad for metre, x in places for quad in _written(str(metre), x, float(metre))]
-    return [Surface(colour, tuple(quads))] if quads else []
+    quads = [quad for metre, x in places for quad in _write(str(metre), x, float(metre))]
+    return [Surface(color, tuple(quads))] if quads else []
 
 
-def _written(text: str, x: float, y: float) -> Iterator[Quad]:
+def _write(text: str, x: float, y: float) -> Iterator[Quad]:
     for place, character in enumerate(text):
         begin = x + _GAP + place * (_WIDE + _GAP)
         for segment in _SEGMENTS[character]:
@@ -110,7 +110,7 @@ def _cuts(tile: float, extent: Interval, marks: Interval) -> list[float]:
     return sorted(edges)
 
 
-def cylinder(radius: float, height: float, colours: tuple[Point, Point]) -> list[Surface]:
+def cylinder(radius: float, height: float, colors: tuple[Point, Point]) -> list[Surface]:
     """An upright cylinder about the origin, its side in stripes of two colours."""
     quads: tuple[list[Quad], list[Quad]] = ([], [])
     angles = np.linspace(0.0, 2 * math.pi, SIDES + 1).tolist()
@@ -118,7 +118,7 @@ def cylinder(radius: float, height: float, colours: tuple[Point, Point]) -> list
         stripe = number * 2 * STRIPES // SIDES % 2
         quads[stripe].append(_side(one, other, radius, height))
         quads[stripe].extend(_lids(one, other, radius, height))
-    return [Surface(colour, tuple(part)) for colour, part in zip(colours, quads, strict=True)]
+    return [Surface(color, tuple(part)) for color, part in zip(colors, quads, strict=True)]
 
 
 def _side(one: float, other: float, radius: float, height: float) -> Quad:

@@ -30,7 +30,7 @@ _LIGHT = {
 _SKY = np.array([[196, 212, 228], [240, 244, 247]])  # red, green, blue at the top and the bottom
 
 
-class Stage(Server):
+class Scene(Server):
     """A PyBullet server with visual shapes; it draws in memory and needs no screen."""
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ class Stage(Server):
             vertices=surface.vertices(),
             indices=surface.indices(),
             normals=surface.normals(),
-            rgbaColor=(*surface.colour, 1.0),
+            rgbaColor=(*surface.color, 1.0),
             specularColor=(0.0, 0.0, 0.0),
             physicsClientId=self.client,
         )
@@ -82,10 +82,10 @@ class Stage(Server):
     def put(self, body: int, position: Sequence[float], orientation: Sequence[float]) -> None:
         """Put the frame of a body's base there: m, and a quaternion (x, y, z, w)."""
         dynamics = pybullet.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
-        centre = pybullet.multiplyTransforms(  # Bullet places the centre of mass
+        center = pybullet.multiplyTransforms(  # Bullet places the centre of mass
             position, orientation, dynamics[_LOCAL_POSITION], dynamics[_LOCAL_ORIENTATION]
         )
-        pybullet.resetBasePositionAndOrientation(body, *centre, physicsClientId=self.client)
+        pybullet.resetBasePositionAndOrientation(body, *center, physicsClientId=self.client)
 
     def bend(self, body: int, angles: Iterable[float]) -> None:
         """Set the joints of a robot, in rad, in the order they were named."""
@@ -100,7 +100,7 @@ class Stage(Server):
         view = pybullet.computeViewMatrixFromYawPitchRoll(
             _ORIGIN, camera.distance, camera.yaw, camera.pitch, 0.0, upAxisIndex=2
         )
-        _, _, colours, _, bodies = pybullet.getCameraImage(
+        _, _, colors, _, bodies = pybullet.getCameraImage(
             width * _FINER,
             height * _FINER,
             view,
@@ -111,7 +111,7 @@ class Stage(Server):
             **_LIGHT,
         )
         shape = (height * _FINER, width * _FINER)
-        seen = np.array(colours, dtype=np.uint16).reshape(*shape, 4)[..., :3]
+        seen = np.array(colors, dtype=np.uint16).reshape(*shape, 4)[..., :3]
         row, column = np.nonzero(np.reshape(bodies, shape) < 0)
         seen[row, column] = _sky(shape[0])[row]
         shares = [seen[i::_FINER, j::_FINER] for i in range(_FINER) for j in range(_FINER)]

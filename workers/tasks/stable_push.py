@@ -53,7 +53,7 @@ class StablePush(Task):
         hand = observed.signals["hand_position"]
         return np.stack(
             [
-                np.any([_tipped(each) for each in objects], axis=0),
+                np.any([_has_tipped(each) for each in objects], axis=0),
                 np.any([~self._on_table(each[0], each[1], 0.0) for each in objects], axis=0),
                 ~self._on_table(hand[0], hand[1], self.margin),
                 observed.signals["table_contact"],
@@ -66,7 +66,7 @@ class StablePush(Task):
         total = 0.0
         for number, (_, y_start) in enumerate(self.starts):
             last = self._object(observed, number)[:, -1:]
-            fallen = _tipped(last)[0] or not self._on_table(last[0], last[1], 0.0)[0]
+            fallen = _has_tipped(last)[0] or not self._on_table(last[0], last[1], 0.0)[0]
             total += -y_max if fallen else self.direction * (float(last[1, 0]) - y_start)
         return total
 
@@ -83,7 +83,7 @@ class StablePush(Task):
         return (x_low - margin <= x) & (x <= x_high + margin) & (y_low - margin <= y) & (y <= y_high + margin)
 
 
-def _tipped(pose: Float32[np.ndarray, "9 time"]) -> Bool[np.ndarray, " time"]:
+def _has_tipped(pose: Float32[np.ndarray, "9 time"]) -> Bool[np.ndarray, " time"]:
     """Whether the object's own axis leans more than 30° from the vertical: z of (first × second axis)."""
     first_x, first_y, second_x, second_y = pose[3], pose[4], pose[6], pose[7]
     return first_x * second_y - first_y * second_x < TIPPED_COSINE

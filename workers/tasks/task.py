@@ -45,7 +45,7 @@ class Task(ABC):
         return self.objective(observed, bad)
 
 
-def marked(task: Task, bad: Any, steps: int) -> Bad:
+def check_bad(task: Task, bad: Any, steps: int) -> Bad:
     """What `is_bad` of a task returned for so many steps, if an episode can hold it.
 
     Raises:

@@ -16,15 +16,15 @@ import numpy as np
 
 from cluster.hardware import campaign, journal
 from cluster.hardware.campaign import Campaign
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
-from cluster.hardware.status import Standing
+from cluster.hardware.status import Phase
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
 
 DIMENSIONS = 5
-IDENTITY = Identity("desk", "desk", "climb", 7, "", 10, 2, Approval.POLICY)
+IDENTITY = CampaignIdentity("desk", "desk", "climb", 7, "", 10, 2, Approval.POLICY)
 OPTIMUM = np.linspace(0.2, 0.8, DIMENSIONS)
 
 
@@ -106,7 +106,7 @@ def opened(folder: Path) -> Journal:
 
 def campaign_on(opened_journal: Journal, robot: DeskRobot, suggest=climb) -> Campaign:
     return Campaign(
-        opened_journal, robot, suggest, lambda _: None, DIMENSIONS, asdict(Process.own()), {"desk": "1"}
+        opened_journal, robot, suggest, lambda _: None, DIMENSIONS, asdict(Process.current()), {"desk": "1"}
     )
 
 
@@ -115,8 +115,8 @@ def carry_out(
     burns_at: int = -1,
     pace: float = 0.0,
     faulty: frozenset[int] = frozenset(),
-    identity: Identity = IDENTITY,
-) -> tuple[Standing, list[str]]:
+    identity: CampaignIdentity = IDENTITY,
+) -> tuple[Phase, list[str]]:
     """The start command without Ray: until the campaign is complete or a person must act."""
     fuse = Fuse(burns_at)
     with FolderLock(folder, patience=10.0):
@@ -126,8 +126,8 @@ def carry_out(
         with closing(FusedJournal(folder / journal.FILE, now)) as fused:
             fused.fuse = fuse
             robot = DeskRobot(folder, fuse, pace, faulty)
-            standing = Standing.READY
-            while standing is Standing.READY:
+            standing = Phase.READY
+            while standing is Phase.READY:
                 standing = campaign.advance(campaign_on(fused, robot))
     return standing, fuse.names
 

@@ -10,7 +10,7 @@ import pytest
 from cluster.hardware import campaign, journal
 from cluster.hardware.identity import Approval
 from cluster.hardware.states import State
-from cluster.hardware.status import Standing, measured, planned, standing
+from cluster.hardware.status import Phase, measured_trials, phase_of, planned_trials
 from tests.cluster.hardware.desk import (
     DIMENSIONS,
     IDENTITY,
@@ -43,7 +43,7 @@ def whole(folder):
 
 
 def test_a_campaign_measures_two_random_trials_and_then_the_planned_ones(tmp_path):
-    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path)[0] is Phase.COMPLETE
     trials, _ = whole(tmp_path)
     assert [trial.kind for trial in trials] == ["random", "random", "suggested", "suggested"]
     assert [trial.f for trial in trials] == [objective(trial.x) for trial in trials]
@@ -98,14 +98,14 @@ def test_the_robot_starts_only_after_running_is_in_the_journal(tmp_path, book):
 
 
 def test_one_advance_moves_the_robot_once(tmp_path, book):
-    assert campaign.advance(campaign_on(book, robot_in(tmp_path))) is Standing.READY
+    assert campaign.advance(campaign_on(book, robot_in(tmp_path))) is Phase.READY
     assert starts(tmp_path) == ["desk-1-000"]
 
 
 def test_a_complete_campaign_does_nothing_more(tmp_path):
     carry_out(tmp_path)
     before = whole(tmp_path)
-    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path)[0] is Phase.COMPLETE
     assert whole(tmp_path) == before
 
 
@@ -138,11 +138,11 @@ def test_the_faces_of_the_unit_cube_are_within_the_limits(edge):
 def test_an_operators_campaign_waits_for_approval_and_goes_on_after_it(tmp_path):
     identity = replace(IDENTITY, approval=Approval.OPERATOR, trials=0)
     for number in range(2):
-        assert carry_out(tmp_path, identity=identity)[0] is Standing.AWAITS_APPROVAL
+        assert carry_out(tmp_path, identity=identity)[0] is Phase.AWAITS_APPROVAL
         assert len(starts(tmp_path)) == number
         with closing(opened(tmp_path)) as book:
             campaign.approve(book, book.trial(number), "operator: Ada")
-    assert carry_out(tmp_path, identity=identity)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path, identity=identity)[0] is Phase.COMPLETE
 
 
 def test_a_fault_is_failed_and_the_campaign_measures_another_controller(tmp_path):
@@ -169,7 +169,7 @@ def test_what_no_driver_declared_a_fault_leaves_the_trial_unknown(tmp_path, book
 
     with pytest.raises(OSError, match="cable"):
         campaign.advance(campaign_on(book, Broken(tmp_path, Fuse(-1))))
-    assert campaign.advance(campaign_on(book, robot_in(tmp_path))) is Standing.AWAITS_RESOLUTION
+    assert campaign.advance(campaign_on(book, robot_in(tmp_path))) is Phase.AWAITS_RESOLUTION
     assert starts(tmp_path) == ["desk-1-000"]
 
 
@@ -179,7 +179,7 @@ def test_a_trial_id_the_ledger_knows_does_not_move_the_robot_again(tmp_path, boo
     with pytest.raises(RuntimeError, match="already moved the robot"):
         campaign.advance(campaign_on(book, robot))
     assert len(starts(tmp_path)) == 1
-    assert campaign.advance(campaign_on(book, robot)) is Standing.AWAITS_RESOLUTION
+    assert campaign.advance(campaign_on(book, robot)) is Phase.AWAITS_RESOLUTION
 
 
 def granted_by_a_dead_process(book, robot):
@@ -206,19 +206,19 @@ def test_a_granted_trial_that_the_ledger_knows_is_unknown(tmp_path, book):
 def test_standing_follows_from_the_trials(tmp_path):
     carry_out(tmp_path)
     trials, _ = whole(tmp_path)
-    assert (measured(trials), planned(IDENTITY)) == (4, 4)
+    assert (measured_trials(trials), planned_trials(IDENTITY)) == (4, 4)
     last = trials[-1]
     expected = {
-        State.PROPOSED: Standing.READY,
-        State.CHECKED: Standing.READY,
-        State.APPROVED: Standing.READY,
-        State.GRANTED: Standing.RUNNING,
-        State.RUNNING: Standing.RUNNING,
-        State.UNKNOWN: Standing.AWAITS_RESOLUTION,
-        State.FAILED: Standing.READY,
-        State.ABORTED: Standing.READY,
-        State.REJECTED: Standing.READY,
-        State.MEASURED: Standing.COMPLETE,
+        State.PROPOSED: Phase.READY,
+        State.CHECKED: Phase.READY,
+        State.APPROVED: Phase.READY,
+        State.GRANTED: Phase.RUNNING,
+        State.RUNNING: Phase.RUNNING,
+        State.UNKNOWN: Phase.AWAITS_RESOLUTION,
+        State.FAILED: Phase.READY,
+        State.ABORTED: Phase.READY,
+        State.REJECTED: Phase.READY,
+        State.MEASURED: Phase.COMPLETE,
     }
-    found = {state: standing((*trials[:-1], replace(last, state=state)), IDENTITY) for state in State}
+    found = {state: phase_of((*trials[:-1], replace(last, state=state)), IDENTITY) for state in State}
     assert found == expected

@@ -18,9 +18,9 @@ from cluster.hardware import connect, lock, operator
 from cluster.hardware.actor import HardwareActor, actor_options
 from cluster.hardware.driver import start
 from cluster.hardware.identity import Approval
-from cluster.hardware.plan import Plan, identify
+from cluster.hardware.plan import CampaignPlan, identify
 from cluster.hardware.states import State
-from cluster.hardware.status import Standing
+from cluster.hardware.status import Phase
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
 from tests.cluster.hardware.desk import opened, starts
@@ -31,7 +31,7 @@ LONG_PACE_SECONDS = 600.0
 
 def plan_in(folder, pace=0.0, trials=1, approval=Approval.POLICY):
     identity = identify("franka-rehearsal", "random", trials, 3, 10, None, approval)
-    return Plan(identity, folder, None, pace)
+    return CampaignPlan(identity, folder, None, pace)
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_nothing_ray_does_can_start_a_trial_twice():
 def test_a_campaign_runs_to_its_end_and_every_trial_is_tracked(ray_session, tracker, settings, tmp_path):
     reports = []
     last = start(settings, ray_session, tracker, plan_in(tmp_path), reports.append, print)
-    assert last.standing is Standing.COMPLETE
+    assert last.standing is Phase.COMPLETE
     assert [report.measured for report in reports] == [0, 1, 2, 3]
     [run] = tracker.client.search_runs([tracker.experiment], f"tags.`svaedc.campaign` = '{last.name}'")
     best = tracker.client.get_metric_history(run.info.run_id, "best")
@@ -137,8 +137,8 @@ def test_a_waiting_campaign_goes_on_when_a_person_approves(ray_session, tracker,
     plan = plan_in(tmp_path, trials=0, approval=Approval.OPERATOR)
     reports = []
     last = start(settings, ray_session, tracker, plan, reports.append, print)
-    assert last.standing is Standing.COMPLETE
-    assert Standing.AWAITS_APPROVAL in {report.standing for report in reports}
+    assert last.standing is Phase.COMPLETE
+    assert Phase.AWAITS_APPROVAL in {report.standing for report in reports}
     for approver in approvers:
         approver.join()
 
@@ -157,7 +157,7 @@ def test_a_folder_of_another_campaign_is_refused_and_the_robot_is_free_afterward
     with pytest.raises(UserError, match="holds a campaign with trials '0', asked for '1'"):
         start(settings, ray_session, tracker, plan_in(tmp_path, trials=1), lambda _: None, print)
     last = start(settings, ray_session, tracker, plan_in(tmp_path / "other"), lambda _: None, print)
-    assert last.standing is Standing.COMPLETE
+    assert last.standing is Phase.COMPLETE
 
 
 @pytest.fixture
@@ -216,7 +216,7 @@ def test_a_command_interrupted_while_it_waits_leaves_nothing_behind(
     assert gone("franka-rehearsal", settings.namespace)
     ray.kill(neighbour)
     last = start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, print)
-    assert last.standing is Standing.COMPLETE
+    assert last.standing is Phase.COMPLETE
     assert gone("franka-rehearsal", settings.namespace)
 
 
@@ -240,14 +240,14 @@ from pathlib import Path
 from cluster.config import HardwareSettings, RaySettings, TrackingSettings
 from cluster.hardware.driver import start
 from cluster.hardware.identity import Approval
-from cluster.hardware.plan import Plan, identify
+from cluster.hardware.plan import CampaignPlan, identify
 from cluster.session import connect
 from cluster.tracking import open_tracker
 
 if __name__ == "__main__":
     address, namespace, folder, store, pace = sys.argv[1:]
     identity = identify("franka-rehearsal", "random", 1, 3, 10, None, Approval.POLICY)
-    plan = Plan(identity, Path(folder), None, float(pace))
+    plan = CampaignPlan(identity, Path(folder), None, float(pace))
     tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{store}"))
     ray_settings = RaySettings(num_cpus=1, object_store_memory=100_000_000)
     with connect(ray_settings, address or None) as session:
@@ -288,5 +288,5 @@ def test_a_killed_local_driver_leaves_an_unknown_trial_and_then_goes_on(tmp_path
     assert len(starts(folder)) == 1
     operator.resolve(folder, 0, "measured", "Ada", "seen", 0.25, 0.5)
     assert driving(tmp_path, "", "lab", 0.0).wait(timeout=180) == 0
-    assert operator.status(folder).standing is Standing.COMPLETE
+    assert operator.status(folder).standing is Phase.COMPLETE
     assert len(set(starts(folder))) == len(starts(folder)) == 3

@@ -11,8 +11,8 @@ import pytest
 from cluster.errors import UserError
 from cluster.hardware import journal
 from cluster.hardware.database import JournalCorrupt, JournalError
-from cluster.hardware.events import replayed
-from cluster.hardware.identity import Approval, Identity, IdentityMismatch
+from cluster.hardware.events import replay
+from cluster.hardware.identity import Approval, CampaignIdentity, IdentityMismatch
 from cluster.hardware.journal import IllegalTransition, Journal, KeyReused, RobotTaken
 from cluster.hardware.states import LEGAL, State
 from tests.cluster.hardware.desk import IDENTITY, carry_out, now
@@ -130,7 +130,7 @@ def test_not_a_number_never_enters_the_journal(book):
 def test_the_trials_are_what_the_events_add_up_to(tmp_path):
     carry_out(tmp_path)
     with closing(Journal(tmp_path / journal.FILE, now)) as opened:
-        assert tuple(replayed(opened.events()).values()) == opened.trials()
+        assert tuple(replay(opened.events()).values()) == opened.trials()
 
 
 TAMPERINGS = {
@@ -245,5 +245,5 @@ def test_every_error_of_the_journal_is_one_a_user_can_read():
 
 
 def test_an_equal_identity_is_accepted_by_itself():
-    twin = Identity(*(getattr(IDENTITY, field) for field in IDENTITY.__dataclass_fields__))
+    twin = CampaignIdentity(*(getattr(IDENTITY, field) for field in IDENTITY.__dataclass_fields__))
     assert IDENTITY.require(twin, "here") is None

@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from cluster.hardware import journal
 from cluster.hardware.database import JournalCorrupt
-from cluster.hardware.events import broken_link, replayed
+from cluster.hardware.events import broken_link, replay
 from cluster.hardware.journal import IllegalTransition, Journal, KeyReused, RobotTaken
 from cluster.hardware.states import ACTIVE, LEGAL, State
 from tests.cluster.hardware.desk import IDENTITY, carry_out, now
@@ -93,7 +93,7 @@ class JournalMachine(RuleBasedStateMachine):
     def the_chain_is_whole_and_adds_up_to_the_trials(self):
         events = self.book.events()
         assert broken_link(events, IDENTITY.genesis("desk-1")) is None
-        assert replayed(events) == {trial.number: trial for trial in self.book.trials()}
+        assert replay(events) == {trial.number: trial for trial in self.book.trials()}
 
 
 JournalMachine.TestCase.settings = settings(

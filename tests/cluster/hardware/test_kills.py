@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from cluster.hardware import campaign, journal
-from cluster.hardware.identity import Approval, Identity
+from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.journal import RobotTaken
 from cluster.hardware.states import State
-from cluster.hardware.status import Standing
+from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import carry_out, objective, opened, starts
 from workers.hardware.ledger import MotionLedger
 
-SHORT = Identity("desk", "desk", "climb", 7, "", 10, 1, Approval.POLICY)
+SHORT = CampaignIdentity("desk", "desk", "climb", 7, "", 10, 1, Approval.POLICY)
 POINTS_PER_TRIAL = 15
 POINTS = 2 + 3 * POINTS_PER_TRIAL
 SIGKILLED = -9
@@ -45,7 +45,7 @@ def resolve(folder):
 def undisturbed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     standing, names = carry_out(folder, identity=SHORT)
-    assert standing is Standing.COMPLETE
+    assert standing is Phase.COMPLETE
     assert len(names) == POINTS
     return journal_of(folder)[0], names
 
@@ -69,11 +69,11 @@ def test_a_kill_loses_nothing_and_repeats_nothing(processes, tmp_path, undisturb
         "after running", "before motion", "in motion", "after motion", "before measured"
     }  # fmt: skip
     standing, _ = carry_out(tmp_path, identity=SHORT)
-    assert standing is (Standing.AWAITS_RESOLUTION if may_have_moved else Standing.COMPLETE)
+    assert standing is (Phase.AWAITS_RESOLUTION if may_have_moved else Phase.COMPLETE)
     if may_have_moved:
         assert starts(tmp_path) == moved
         resolve(tmp_path)
-        assert carry_out(tmp_path, identity=SHORT)[0] is Standing.COMPLETE
+        assert carry_out(tmp_path, identity=SHORT)[0] is Phase.COMPLETE
 
     trials, events = journal_of(tmp_path)
     assert events[: len(survived)] == survived

@@ -14,7 +14,7 @@ from cluster.hardware.identity import Approval
 from cluster.hardware.journal import IllegalTransition
 from cluster.hardware.lock import FolderLock, FolderTaken, Process
 from cluster.hardware.states import State
-from cluster.hardware.status import Standing
+from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
 
 IN_MOTION = 13
@@ -31,16 +31,16 @@ def die(processes, folder, point):
 
 def test_a_trial_left_running_is_explained_and_resolved_as_measured(processes, tmp_path):
     die(processes, tmp_path, IN_MOTION)
-    assert operator.status(tmp_path).standing is Standing.RUNNING
+    assert operator.status(tmp_path).standing is Phase.RUNNING
     assert "left behind by a dead process" in operator.status(tmp_path).advice
     carry_out(tmp_path)
     seen = operator.status(tmp_path)
-    assert seen.standing is Standing.AWAITS_RESOLUTION
+    assert seen.standing is Phase.AWAITS_RESOLUTION
     assert "its ledger: started, never ended" in seen.advice
     assert f"svaedc hardware resolve {tmp_path} --trial 0" in seen.advice
     trial = operator.resolve(tmp_path, 0, "measured", "Ada", "read it off the tape", 0.5, 0.1)
     assert (trial.state, trial.measurement) == (State.MEASURED, (0.5, 0.1))
-    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path)[0] is Phase.COMPLETE
     assert starts(tmp_path) == [f"desk-1-{number:03d}" for number in range(4)]
 
 
@@ -55,7 +55,7 @@ def test_what_the_ledger_still_knows_is_told(processes, tmp_path):
 def test_a_running_trial_can_be_resolved_at_once_and_is_replaced_by_another(processes, tmp_path, outcome):
     die(processes, tmp_path, IN_MOTION)
     operator.resolve(tmp_path, 0, outcome, "Ada", "it fell", None, None)
-    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path)[0] is Phase.COMPLETE
     with closing(opened(tmp_path)) as book:
         assert [trial.state for trial in book.trials()] == [outcome, *4 * ["measured"]]
         past = [event for event in book.events() if event.trial == 0]
@@ -115,7 +115,7 @@ def test_a_waiting_trial_is_named_with_the_command_that_approves_it(tmp_path):
     identity = replace(IDENTITY, approval=Approval.OPERATOR)
     carry_out(tmp_path, identity=identity)
     seen = operator.status(tmp_path)
-    assert seen.standing is Standing.AWAITS_APPROVAL
+    assert seen.standing is Phase.AWAITS_APPROVAL
     assert f"svaedc hardware approve {tmp_path} --trial 0 --who NAME" in seen.advice
     assert operator.approve(tmp_path, 0, "Ada").state is State.APPROVED
     with pytest.raises(IllegalTransition, match="from approved to approved"):
@@ -131,7 +131,7 @@ def test_nobody_is_not_a_person(tmp_path):
 def test_status_counts_and_finds_the_best(tmp_path):
     carry_out(tmp_path)
     seen = operator.status(tmp_path)
-    assert (seen.measured, seen.planned, seen.standing, seen.advice) == (4, 4, Standing.COMPLETE, "")
+    assert (seen.measured, seen.planned, seen.standing, seen.advice) == (4, 4, Phase.COMPLETE, "")
     assert seen.best == max(trial.f for trial in seen.trials)
 
 
@@ -149,7 +149,7 @@ def test_a_failed_trial_is_told_with_its_reason_after_another_was_amended(tmp_pa
             campaign.advance(campaign_on(book, DeskRobot(tmp_path, Fuse(-1), faulty=frozenset({1}))))
     operator.resolve(tmp_path, 0, "measured", "Ada", "tape was wrong", -0.5, 0.0)
     assert operator.status(tmp_path).advice.startswith("trial 1 was failed: a motor is hot; see to it")
-    assert carry_out(tmp_path)[0] is Standing.COMPLETE
+    assert carry_out(tmp_path)[0] is Phase.COMPLETE
 
 
 def test_the_export_is_the_campaign_and_every_event(tmp_path):
@@ -171,11 +171,11 @@ def test_the_lock_names_the_process_that_holds_it_and_dies_with_it(processes, tm
     process = processes.Process(target=hold, args=(tmp_path, held, let_go))
     process.start()
     assert held.wait(timeout=180)
-    assert operator.lock.holder(tmp_path) == replace(Process.own(), pid=process.pid)
+    assert operator.lock.holder(tmp_path) == replace(Process.current(), pid=process.pid)
     with pytest.raises(FolderTaken, match=f"process {process.pid}"):
         FolderLock(tmp_path, 0.2)
     process.kill()
     process.join()
     with FolderLock(tmp_path, 5.0):
-        assert operator.lock.holder(tmp_path) == Process.own()
+        assert operator.lock.holder(tmp_path) == Process.current()
     assert operator.lock.holder(tmp_path) is None

@@ -13,10 +13,10 @@ from cluster.hardware import operator, station
 from cluster.hardware.executor import Executor
 from cluster.hardware.identity import Approval, IdentityMismatch
 from cluster.hardware.lock import FolderTaken
-from cluster.hardware.plan import Plan, identify
+from cluster.hardware.plan import CampaignPlan, identify
 from cluster.hardware.proposals import Proposals, fingerprint, library_versions
 from cluster.hardware.station import RobotTaken, Station
-from cluster.hardware.status import Standing
+from cluster.hardware.status import Phase
 from svaedc.bo import methods
 from svaedc.model import checkpoint
 from svaedc.model.config import ModelConfig
@@ -28,14 +28,14 @@ ROBOT = "franka-rehearsal"
 
 
 def plan_in(folder, method="random", trials=1, model=None, approval=Approval.POLICY):
-    return Plan(identify(ROBOT, method, trials, 3, 50, model, approval), folder, model, 0.0)
+    return CampaignPlan(identify(ROBOT, method, trials, 3, 50, model, approval), folder, model, 0.0)
 
 
 def carried_out(plan):
     executor = Executor(plan)
     try:
         seen = executor.status()
-        while seen.standing is Standing.READY:
+        while seen.standing is Phase.READY:
             seen = executor.advance()
     finally:
         executor.close()
@@ -78,7 +78,7 @@ def test_a_plan_with_an_impossible_argument_is_refused(change, message):
 @pytest.mark.parametrize("pace", [-1.0, 1e10, float("inf"), float("nan")])
 def test_a_pace_that_nothing_can_wait_for_is_refused(tmp_path, pace):
     with pytest.raises(UsageError, match=r"pace must lie in \[0, 86400\] s, got"):
-        Plan(plan_in(tmp_path).identity, tmp_path, None, pace)
+        CampaignPlan(plan_in(tmp_path).identity, tmp_path, None, pace)
 
 
 def test_a_plan_means_the_same_folder_in_every_working_directory(monkeypatch, tmp_path):
@@ -89,7 +89,7 @@ def test_a_plan_means_the_same_folder_in_every_working_directory(monkeypatch, tm
 @pytest.mark.parametrize("method", ["random", "se", "svae-dc"])
 def test_a_rehearsal_campaign_runs_to_its_end(tmp_path, model, method):
     seen = carried_out(plan_in(tmp_path / method, method, 2, model if methods.needs_model(method) else None))
-    assert seen.standing is Standing.COMPLETE
+    assert seen.standing is Phase.COMPLETE
     assert [trial.kind for trial in seen.trials] == ["random", "random", "suggested", "suggested"]
     starts = MotionLedger(tmp_path / method / "starts.jsonl").entries()
     assert [entry["event"] for entry in starts] == ["started", "ended"] * 4
@@ -100,7 +100,7 @@ def test_an_interrupted_campaign_proposes_bit_for_bit_what_an_undisturbed_one_do
     used = model if methods.needs_model(method) else None
     whole = carried_out(plan_in(tmp_path / "whole", method, 2, used))
     seen = None
-    while seen is None or seen.standing is Standing.READY:
+    while seen is None or seen.standing is Phase.READY:
         executor = Executor(plan_in(tmp_path / "pieces", method, 2, used))
         seen = executor.advance()
         executor.close()
@@ -125,7 +125,7 @@ def test_another_campaign_in_the_folder_is_refused_naming_the_field(tmp_path):
     carried_out(plan_in(tmp_path, trials=0))
     with pytest.raises(IdentityMismatch, match="holds a campaign with trials '0', asked for '1'"):
         Executor(plan_in(tmp_path, trials=1))
-    assert carried_out(plan_in(tmp_path, trials=0)).standing is Standing.COMPLETE
+    assert carried_out(plan_in(tmp_path, trials=0)).standing is Phase.COMPLETE
 
 
 def test_a_second_executor_is_refused_while_the_first_holds_the_folder(tmp_path, monkeypatch):
@@ -135,7 +135,7 @@ def test_a_second_executor_is_refused_while_the_first_holds_the_folder(tmp_path,
         Executor(plan_in(tmp_path))
     first.close()
     second = Executor(plan_in(tmp_path))
-    assert second.status().standing is Standing.READY
+    assert second.status().standing is Phase.READY
     second.close()
 
 

@@ -14,7 +14,7 @@ from workers.collection.recompute import rederive
 from workers.collection.shard import collect_shard, roll_out
 from workers.dataset.folder import create
 from workers.dataset.identity import Identity, identity_of
-from workers.dataset.quantisation import error_bound, restored, stored
+from workers.dataset.quantisation import decode, encode, error_bound
 from workers.dataset.verification import verify
 
 
@@ -34,7 +34,7 @@ def test_a_value_within_its_bounds_is_restored_within_the_stated_error(data, low
     inside = st.floats(np.float32(low), np.float32(low + width), width=32)
     values = np.array([[data.draw(inside) for _ in range(5)]], dtype=np.float32)
     kept = np.clip(values, low, low + width)
-    again = restored(stored(values, identity), identity)
+    again = decode(encode(values, identity), identity)
     assert np.abs(again.astype(np.float64) - kept).max() <= error_bound(identity)[0]
 
 
@@ -58,8 +58,8 @@ TOY = Identity(
 
 def test_every_code_is_restored_to_a_value_with_that_code():
     codes = np.arange(-(2**15), 2**15, dtype=np.int16)[None, :]
-    values = restored(codes, TOY)
-    np.testing.assert_array_equal(stored(values, TOY), codes)
+    values = decode(codes, TOY)
+    np.testing.assert_array_equal(encode(values, TOY), codes)
     assert values[0, [0, -1]].tolist() == [-1.0, 1.0]
 
 
@@ -67,18 +67,18 @@ def test_the_error_of_the_bound_is_reached_between_two_codes():
     """The bound is no larger than it must be."""
     step = 2.0 / 65535
     values = np.array([[-1.0 + 1000.5 * step, 0.5 * step]], dtype=np.float32)
-    error = np.abs(restored(stored(values, TOY), TOY).astype(np.float64) - values).max()
+    error = np.abs(decode(encode(values, TOY), TOY).astype(np.float64) - values).max()
     assert 0.99 * error_bound(TOY)[0] <= error + 1e-7
 
 
 def test_values_a_little_beyond_their_bounds_become_the_bounds():
     values = np.array([[-1.00001, 1.00001]], dtype=np.float32)
-    assert restored(stored(values, TOY), TOY).tolist() == [[-1.0, 1.0]]
+    assert decode(encode(values, TOY), TOY).tolist() == [[-1.0, 1.0]]
 
 
 def test_what_has_no_code_is_refused():
     with pytest.raises(ValueError, match="NaN or infinity"):
-        stored(np.array([[np.nan, 0.0]], dtype=np.float32), TOY)
+        encode(np.array([[np.nan, 0.0]], dtype=np.float32), TOY)
 
 
 def test_another_storage_is_another_dataset_and_the_old_ones_keep_their_digest(identity, coded):

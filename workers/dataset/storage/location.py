@@ -27,7 +27,7 @@ def _name(path: Location) -> str:
     return path.name
 
 
-def fetched(path: Location) -> Location:
+def fetch(path: Location) -> Location:
     """The same path, to be read several times: an object's bytes are asked for once."""
     return path if isinstance(path, Path) else path.fetched()
 

@@ -53,10 +53,10 @@ def refusal(path: object, error: Exception) -> StoreError | None:
     if isinstance(error, StoreError):
         return StoreError(error.errno, error.strerror)
     is_of_store = "AWS Error" in str(error) and not _GONE.search(str(error))
-    return StoreError(*_explained(path, str(error))) if is_of_store else None
+    return StoreError(*_explain(path, str(error))) if is_of_store else None
 
 
-def _explained(path: object, reason: str) -> tuple[int, str]:
+def _explain(path: object, reason: str) -> tuple[int, str]:
     """What is wrong, and its number: EACCES for what no further attempt changes."""
     brief = re.sub(r"\s*\(Request ID.*", "", reason.partition("AWS Error ")[2])
     if "NO_SUCH_BUCKET" in reason:
@@ -95,7 +95,7 @@ def require_bucket(bucket: str, options: Options) -> None:
     with reaching(name):
         is_there = is_found(connection(options).get_file_info(bucket))
     if not is_there:
-        raise StoreError(*_explained(name, "NO_SUCH_BUCKET"))
+        raise StoreError(*_explain(name, "NO_SUCH_BUCKET"))
 
 
 @cache

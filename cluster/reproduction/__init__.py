@@ -1,0 +1,1 @@
+"""`svaedc reproduce`: the figures of the paper, from data to verdict."""

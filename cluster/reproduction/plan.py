@@ -1,0 +1,203 @@
+"""What reproducing a figure will do: the data and models it makes, those it was given, where all lies."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from cluster.config import Settings, TrainSettings
+from cluster.errors import UserError
+from cluster.models import trained_model
+from cluster.reproduction.experiment import NINE, Panel, Recipe
+from cluster.training.record import MEASURES
+from svaedc.training.presets import Sizes, preset, usual_stride
+from workers import setups
+from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.manifest import MANIFEST
+from workers.dataset.storage.location import Location
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How much of the paper's data and training.
+
+    Attributes:
+        preset: of training.
+        episodes: by setup.
+    """
+
+    preset: str
+    episodes: Mapping[str, int]
+
+
+_DATA = ("franka", "yumi", "daisy-27d", "daisy-11d")
+SCALES: Final[Mapping[str, Scale]] = MappingProxyType(
+    {
+        "machine": Scale("compact", dict(zip(_DATA, (50_000, 20_000, 10_000, 10_000), strict=True))),
+        "paper": Scale("paper", dict.fromkeys(_DATA, 500_000)),
+    }
+)
+"""`paper`: sections 6.1 and 7.1, on a cluster with GPUs. `machine`: an hour or two of two cores."""
+
+
+def scale(name: str) -> Scale:
+    """The scale of that name.
+
+    Raises:
+        LookupError: there is none.
+    """
+    if name not in SCALES:
+        raise LookupError(f"no scale called {name!r}; there are {', '.join(SCALES)}")
+    return SCALES[name]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A recipe at a scale, in a folder.
+
+    Attributes:
+        recipe: of the figure.
+        scale: of data and training.
+        folder: of everything; figures that need the same data or model share them there.
+        episodes: that its models learn from.
+        runs: of each method.
+        dataset: folder of the episodes.
+        collects: whether they are collected; if not, they were given, or every model was.
+        models: folders by latent size.
+        trains: latent sizes whose model is trained; the other models were given.
+    """
+
+    recipe: Recipe
+    scale: Scale
+    folder: Path
+    episodes: int
+    runs: int
+    dataset: Location
+    collects: bool
+    models: Mapping[str, Path]
+    trains: tuple[str, ...]
+
+    @property
+    def results(self) -> Path:
+        """Folder of the figure."""
+        return self.folder / self.recipe.figure
+
+    def comparison(self, panel: Panel) -> Path:
+        """Folder of a panel's comparison."""
+        return self.results / panel.name
+
+    def missing_episodes(self) -> int:
+        """Still to be collected."""
+        if not self.collects:
+            return 0
+        begun = (self.dataset / MANIFEST).exists()
+        done = _open(self.dataset, self.recipe.data).episodes() if begun else 0
+        return max(0, self.episodes - done)
+
+    def is_trained(self, latent: str) -> bool:
+        """Whether the model of this size was given, or is there as a whole."""
+        return latent not in self.trains or (self.models[latent] / MEASURES).exists()
+
+    def training(self, settings: TrainSettings, latent: str) -> TrainSettings:
+        """The settings of training for a size of the latent path."""
+        return settings if latent == NINE else settings.model_copy(update={"latent": latent})
+
+    def updates(self, settings: TrainSettings) -> int:
+        """Gradient updates of one training."""
+        training = preset(self.scale.preset)(self._sizes(settings)).training
+        if settings.updates == "preset":
+            return training.joint.updates + training.prior.updates
+        return settings.updates
+
+    def cache_size(self, settings: TrainSettings) -> int:
+        """Bytes of the episodes that these settings decode, nearly all of them trajectories."""
+        sizes = self._sizes(settings)
+        return 4 * self.episodes * sizes.observation_dim * sizes.time_steps
+
+    def _sizes(self, settings: TrainSettings) -> Sizes:
+        setup = setups.load(self.recipe.data)
+        stride = settings.stride_or(usual_stride(self.scale.preset))
+        return Sizes(setup.dimensions, len(setup.observation), setup.horizon // stride)
+
+
+def resolve(
+    recipe: Recipe,
+    scale: Scale,
+    folder: Path,
+    *,
+    episodes: int,
+    runs: int,
+    dataset: Location | None,
+    models: tuple[Path, ...],
+) -> Reproduction:
+    """A reproduction with every open choice made.
+
+    Args:
+        recipe: of the figure.
+        scale: of data and training.
+        folder: of everything.
+        episodes: to collect.
+        runs: of each method.
+        dataset: that is there already.
+        models: that are there already; what each is for follows from its latent size.
+
+    Raises:
+        UserError: a dataset or model cannot be read, or is of another setup or size.
+    """
+    given = _models_by_setup(recipe, models)
+    trains = tuple(latent for latent in recipe.latents if latent not in given)
+    if dataset is not None:
+        episodes = _open(dataset, recipe.data).episodes()
+    name = f"{recipe.data}-{episodes}"
+    own = {latent: folder / "models" / f"{name}-{scale.preset}-{latent}" for latent in trains}
+    return Reproduction(
+        recipe=recipe,
+        scale=scale,
+        folder=folder,
+        episodes=episodes if trains else 0,
+        runs=runs,
+        dataset=dataset or folder / "data" / name,
+        collects=bool(trains) and dataset is None,
+        models={**given, **own},
+        trains=trains,
+    )
+
+
+def cores(settings: Settings) -> int:
+    """CPUs that a cluster started here would offer."""
+    wanted = settings.ray.num_cpus
+    return len(os.sched_getaffinity(0)) if wanted == "all" else wanted
+
+
+def _open(folder: Location, setup: str) -> Dataset:
+    try:
+        dataset = open_dataset(folder)
+    except (ValueError, OSError) as error:
+        raise UserError(f"cannot use the dataset: {error}") from error
+    if dataset.identity.setup != setup:
+        raise UserError(
+            f"{folder} holds episodes of {dataset.identity.setup!r}, this figure needs {setup!r}: "
+            "name another --dataset, or leave it out to collect one"
+        )
+    return dataset
+
+
+def _models_by_setup(recipe: Recipe, models: tuple[Path, ...]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for folder in models:
+        latent = _latent(folder, recipe.data)
+        if latent not in recipe.latents or latent in found:
+            wanted = ", ".join(recipe.latents) or "none"
+            raise UserError(
+                f"{folder} has the latent size {latent}; {recipe.figure} takes one model of each of: {wanted}"
+            )
+        found[latent] = folder
+    return found
+
+
+def _latent(folder: Path, setup: str) -> str:
+    """Steps x dimensions of a model's latent path."""
+    config = trained_model(folder, setup).model.config
+    return f"{config.path_length}x{config.tau_dim}"
