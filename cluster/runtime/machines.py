@@ -4,8 +4,9 @@ import socket
 from typing import Any
 
 import ray
-from ray._private.state import actors
 from ray.exceptions import RpcError
+
+from cluster.runtime.ray_internals import actor_facts
 
 KNOCK_SECONDS = 2.0
 """How long a machine has to answer; Ray itself takes a quarter of a minute to miss one."""
@@ -18,13 +19,12 @@ def own_machine() -> str:
 
 def machine_of(actor: Any) -> str:
     """The id of the machine on which an actor runs; "" if the actor is lost already."""
-    known = actors(actor._actor_id.hex()) or {}
-    return str(known.get("Address", {}).get("NodeID", ""))
+    return str(actor_facts(actor).get("Address", {}).get("NodeID", ""))
 
 
 def has_a_place(actor: Any) -> bool:
     """Whether an actor runs on some machine; otherwise it waits for what it requires, or is lost."""
-    return (actors(actor._actor_id.hex()) or {}).get("State") == "ALIVE"
+    return actor_facts(actor).get("State") == "ALIVE"
 
 
 def is_there(machine: str) -> bool:

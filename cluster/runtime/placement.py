@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ray._private.state import available_resources_per_node
-
 from cluster.errors import UserError
+from cluster.runtime.ray_internals import free_resources
 from cluster.runtime.session import Session
 
 _PATIENCE_SECONDS = 5.0
@@ -95,10 +94,7 @@ def free_machines(session: Session) -> list[FreeNode]:
         return [FreeNode(session.cpus, session.gpus)]
     deadline = time.monotonic() + _PATIENCE_SECONDS
     while True:
-        found = [
-            FreeNode(int(free.get("CPU", 0)), int(free.get("GPU", 0)))
-            for free in available_resources_per_node().values()
-        ]
+        found = [FreeNode(int(free.get("CPU", 0)), int(free.get("GPU", 0))) for free in free_resources()]
         if sum(machine.cpus for machine in found) >= session.cpus or time.monotonic() > deadline:
             return found
         time.sleep(_POLL_SECONDS)

@@ -1,7 +1,9 @@
-"""What a cluster without the dashboard does without: Ray's processes cost CPU time for as long as they live.
+"""What is needed of Ray that it does not publish; no other module imports its private ones.
 
-All of it is there to be looked at in the dashboard, or to print at this terminal what workers print, which no
-command asks for. Workers that die are noticed, and memory is watched over, by the raylet and the head alone.
+Ray's processes cost CPU time for as long as they live. `settings`, `quiet_agent` and `end_spectators` are what a
+cluster without the dashboard does without: all of it is there to be looked at in the dashboard, or to
+print at this terminal what workers print, which no command asks for. Workers that die are noticed, and memory is
+watched over, by the raylet and the head alone.
 `docs/benchmarks.md` says what each entry saves.
 """
 
@@ -10,7 +12,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from ray._private import worker
+from ray._private import ray_constants, services, state, worker
+from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
 
 SETTINGS: Mapping[str, Any] = {
     # Counters that every process exports every ten seconds, for the dashboard and Prometheus.
@@ -52,3 +55,76 @@ def end_spectators() -> None:
     if node is not None:
         node.kill_log_monitor(check_alive=False)
         node.kill_dashboard(check_alive=False)
+
+
+def actor_facts(actor: Any) -> Mapping[str, Any]:
+    """What Ray's head knows of an actor, by the names of its protocol; nothing of one that is lost.
+
+    Args:
+        actor: its handle.
+
+    Returns:
+        `State`, `Address` and more.
+    """
+    return state.actors(actor._actor_id.hex()) or {}
+
+
+def free_resources() -> list[Mapping[str, float]]:
+    """What each machine of the connected cluster has free, by the names of Ray's resources."""
+    return list(state.available_resources_per_node().values())
+
+
+def address_on_this_machine(temporary_folder: str) -> str:
+    """Address of the last cluster started on this machine with its files in that folder; "" for none."""
+    return str(services.find_bootstrap_address(temporary_folder) or "")
+
+
+def node_addresses(address: str, patience: float) -> set[str]:
+    """Network addresses of the machines of a cluster that is not joined yet.
+
+    Unlike `ray.init`, it reports a refused token at once.
+
+    Args:
+        address: host and port of its head.
+        patience: s, for the answer.
+
+    Returns:
+        One for each machine; none while the first has not registered.
+
+    Raises:
+        AuthenticationError: the cluster refuses this process's token.
+        RpcError: it does not answer.
+    """
+    nodes = GcsClient(address=address).get_all_node_info(timeout=patience)
+    return {node.node_manager_address for node in nodes.values()}
+
+
+def use_token() -> None:
+    """Shows a token to the cluster if this user has one; Ray does so for clusters of its own only."""
+    loader = AuthenticationTokenLoader.instance()
+    if "RAY_AUTH_MODE" not in os.environ and loader.has_token(ignore_auth_mode=True):
+        os.environ["RAY_AUTH_MODE"] = "token"
+        Config.initialize("")
+
+
+def stay_on_loopback() -> None:
+    """Makes Ray use 127.0.0.1 where it would look for an address that other machines can reach.
+
+    Ray reads the variable when it is imported, so the constant is set too; its processes inherit the former.
+    """
+    os.environ[ray_constants.ENABLE_RAY_CLUSTERS_ENV_VAR] = "0"
+    ray_constants.ENABLE_RAY_CLUSTER = False
+
+
+def health_check_failure(error: Exception) -> object:
+    """What Ray Train's check of a training process failed of; None for every other error."""
+    from ray.train.v2._internal.exceptions import WorkerHealthCheckFailedError
+
+    return error.health_check_failure if isinstance(error, WorkerHealthCheckFailedError) else None
+
+
+def is_train_error(error: Exception) -> bool:
+    """Whether Ray Train itself raised it, and not the code that it runs."""
+    from ray.train.v2._internal.exceptions import RayTrainError
+
+    return isinstance(error, RayTrainError)

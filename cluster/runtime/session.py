@@ -11,9 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import ray
-from ray._private import ray_constants
-from ray._private.services import find_bootstrap_address
-from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
 from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 
 from cluster.config import Part, RaySettings
@@ -103,7 +100,7 @@ def _session(*, is_local: bool) -> Session:
 
 def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster; a busy machine may need longer than the half minute that Ray grants itself."""
-    _stay_on_loopback()
+    ray_internals.stay_on_loopback()
     _bound_logs(settings.log_file_bytes)
     for further in reversed(range(ATTEMPTS)):
         try:
@@ -149,7 +146,7 @@ def _join(settings: RaySettings, wanted: str) -> None:
     _knock(address, settings.connect_timeout_seconds)
     try:
         if LOOPBACK in _authenticate(address, settings.connect_timeout_seconds):
-            _stay_on_loopback()
+            ray_internals.stay_on_loopback()
         ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
     except AuthenticationError as error:
         raise UserError(f"the Ray cluster at {address} refuses this user's token: {TOKEN_REMEDY}") from error
@@ -175,13 +172,13 @@ def _knock(address: str, patience: float) -> None:
 
 def _on_this_machine(settings: RaySettings) -> str:
     """The address that the last cluster started on this machine left behind."""
-    address = find_bootstrap_address(str(settings.temporary_folder))
+    address = ray_internals.address_on_this_machine(str(settings.temporary_folder))
     if not address:
         raise UserError(
             f"no Ray cluster was started on this machine (none is named in {settings.temporary_folder}): "
             "start one with `ray start --head`, or leave --address out"
         )
-    return str(address)
+    return address
 
 
 def _parts(address: str) -> tuple[str, int]:
@@ -201,42 +198,21 @@ def _authenticate(address: str, patience: float) -> set[str]:
     try:
         return _machines(address, patience)
     except AuthenticationError:
-        use_token()
+        ray_internals.use_token()
         return _machines(address, patience)
 
 
 def _machines(address: str, patience: float) -> set[str]:
-    """Network addresses of the cluster's machines, waiting for the first to register.
-
-    Unlike `ray.init`, it reports a refused token at once.
-    """
-    client = GcsClient(address=address)
+    """Network addresses of the cluster's machines, waiting for the first to register."""
     deadline = time.monotonic() + patience
     while True:
-        nodes = client.get_all_node_info(timeout=patience)
-        if nodes or time.monotonic() > deadline:
-            return {node.node_manager_address for node in nodes.values()}
+        found = ray_internals.node_addresses(address, patience)
+        if found or time.monotonic() > deadline:
+            return found
         time.sleep(0.2)
-
-
-def use_token() -> None:
-    """Shows a token to the cluster if this user has one; Ray does so for clusters of its own only."""
-    loader = AuthenticationTokenLoader.instance()
-    if "RAY_AUTH_MODE" not in os.environ and loader.has_token(ignore_auth_mode=True):
-        os.environ["RAY_AUTH_MODE"] = "token"
-        Config.initialize("")
 
 
 def _bound_logs(size: int) -> None:
     """Two files of that many bytes per stream of a process; otherwise Ray lets a worker's output grow."""
     os.environ["RAY_ROTATION_MAX_BYTES"] = str(size)
     os.environ["RAY_ROTATION_BACKUP_COUNT"] = "1"
-
-
-def _stay_on_loopback() -> None:
-    """Makes Ray use 127.0.0.1 where it would look for an address that other machines can reach.
-
-    Ray reads the variable when it is imported, so the constant is set too; its processes inherit the former.
-    """
-    os.environ[ray_constants.ENABLE_RAY_CLUSTERS_ENV_VAR] = "0"
-    ray_constants.ENABLE_RAY_CLUSTER = False

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from ray.exceptions import RayActorError, RayError, RayTaskError
 from ray.train import ControllerError, TrainingFailedError, WorkerGroupError
-from ray.train.v2._internal.exceptions import RayTrainError, WorkerHealthCheckFailedError
 from torch.distributed import DistError
+
+from cluster.runtime.ray_internals import health_check_failure, is_train_error
 
 _TRANSPORTS = ("gloo", "nccl")
 """Named by the plain RuntimeErrors in which torch says that another process no longer answers."""
@@ -67,17 +68,13 @@ def _causes(error: TrainingFailedError) -> list[Exception]:
 
 def _cause(failure: Exception) -> Exception:
     """What is inside Ray's wrappings."""
-    inner: object = None
-    if isinstance(failure, WorkerHealthCheckFailedError):
-        inner = failure.health_check_failure
-    elif isinstance(failure, RayTaskError):
-        inner = failure.cause
+    inner = failure.cause if isinstance(failure, RayTaskError) else health_check_failure(failure)
     return _cause(inner) if isinstance(inner, Exception) else failure
 
 
 def _is_loss(cause: Exception) -> bool:
     """Whether a process is gone, or answers no longer; errors inside Ray's tasks are none of that."""
-    return isinstance(cause, (RayError, RayTrainError)) and not isinstance(cause, RayTaskError)
+    return (isinstance(cause, RayError) or is_train_error(cause)) and not isinstance(cause, RayTaskError)
 
 
 def _is_consequence(cause: Exception) -> bool:

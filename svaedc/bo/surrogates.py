@@ -42,7 +42,7 @@ class Surrogate:
     limits: tuple[float, float]
 
     def after(self, history: History) -> tuple[Posterior, float]:
-        """What a history of at least one trial says of all controllers, and the largest objective in its units."""
+        """What at least one trial says of all controllers, and the largest objective in its units."""
         f = scale_objectives(torch.tensor(history.f), self.limits)
         with torch.no_grad():
             phi = self.candidates.features_of(torch.tensor(history.x))

@@ -66,7 +66,7 @@ def machines():
 
     Its head has no CPUs. Its token is that of all tests: a process keeps the first one that it has shown.
     """
-    from cluster.runtime.session import use_token
+    from cluster.runtime.ray_internals import use_token
 
     use_token()
     # Ray leaves a socket open where the port is taken, as its usual one is while another cluster runs here.

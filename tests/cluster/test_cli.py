@@ -41,7 +41,8 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
         "hardware",
     ):
         assert command in result.stdout
-    loaded = "import cluster.cli.main, sys; print(sorted({'ray', 'torch', 'mlflow', 'pybullet'} & sys.modules.keys()))"
+    heavy = {"ray", "torch", "mlflow", "pybullet"}
+    loaded = f"import cluster.cli.main, sys; print(sorted({heavy} & sys.modules.keys()))"
     listed = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert listed.stdout.strip() == "[]"
 

@@ -17,7 +17,7 @@ import psutil
 from pathlib import Path
 from ray.exceptions import RayActorError
 from cluster.config import RaySettings
-from cluster.session import connect
+from cluster.runtime.session import connect
 def tell(*words):
     print("own:", *words)
 class Worker:

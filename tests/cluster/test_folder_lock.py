@@ -11,7 +11,7 @@ from cluster.files import alone_in
 HOLDER = """
 import os, sys, time
 from pathlib import Path
-from cluster.folder_lock import alone_in
+from cluster.files import alone_in
 with alone_in(Path(sys.argv[1]), "taken"):
     print("held", flush=True)
     time.sleep(600)

@@ -24,7 +24,7 @@ from functools import partial
 from pathlib import Path
 
 from workers.environments.point import Point
-from workers.environments.quadratic import maximised
+from workers.setups.quadratic import quadratic_30d
 from workers.randomness import generator
 
 HERE = Path(__file__).parent
@@ -59,7 +59,7 @@ class Sticky(Point):
 
 
 def setup():
-    return replace(maximised(name="sticky", dimensions=30, intrinsic=30), build=partial(Sticky, 30))
+    return replace(quadratic_30d(), name="sticky", build=partial(Sticky, 30))
 '''
 
 LIMIT = 12

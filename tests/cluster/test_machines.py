@@ -26,7 +26,7 @@ from dataclasses import replace
 from functools import partial
 
 from workers.environments.point import Point
-from workers.environments.quadratic import maximised
+from workers.setups.quadratic import quadratic_30d
 
 
 class Slow(Point):
@@ -36,7 +36,7 @@ class Slow(Point):
 
 
 def setup():
-    return replace(maximised(name="slow", dimensions=30, intrinsic=30), build=partial(Slow, 30))
+    return replace(quadratic_30d(), name="slow", build=partial(Slow, 30))
 '''
 PATIENCE = 300.0
 

@@ -15,7 +15,7 @@ JOIN = """
 import sys
 from cluster.config import RaySettings
 from cluster.errors import UserError
-from cluster.session import connect
+from cluster.runtime.session import connect
 try:
     with connect(RaySettings(temporary_folder=sys.argv[2]), sys.argv[1] or None) as session:
         print("joined", session.address, session.cpus, session.is_local)
@@ -27,7 +27,7 @@ HOLD = """
 import sys
 import ray
 from cluster.config import RaySettings
-from cluster.session import connect
+from cluster.runtime.session import connect
 class Holder:
     def ready(self):
         pass
@@ -44,7 +44,7 @@ import sys, time
 from pathlib import Path
 import ray
 from cluster.config import RaySettings
-from cluster.session import connect
+from cluster.runtime.session import connect
 class Talker:
     def talk(self, megabytes):
         for number in range(10_000 * megabytes):
@@ -61,7 +61,7 @@ with connect(RaySettings(num_cpus=1, log_file_bytes=500_000), None):
 SLOW_ONCE = """
 import ray
 from cluster.config import RaySettings
-from cluster.session import connect
+from cluster.runtime.session import connect
 start, refused = ray.init, []
 def busy(**arguments):
     if refused:

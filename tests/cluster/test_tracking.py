@@ -209,7 +209,8 @@ def served(settings, tracker, free_port):
     with tracker.run("franka push of the browser test", "compare", {}):
         pass
     program = (
-        "import sys; from cluster.config import TrackingSettings; from cluster.tracking.server import serve_ui;"
+        "import sys; from cluster.config import TrackingSettings;"
+        "from cluster.tracking.server import serve_ui;"
         f"serve_ui(TrackingSettings(uri={settings.uri!r}, experiment='tests'), {free_port},"
         " lambda page: print(page, flush=True))"
     )

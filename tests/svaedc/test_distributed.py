@@ -14,13 +14,13 @@ import numpy as np
 import torch
 from torch.distributed import destroy_process_group, init_process_group
 from torch.nn.parallel import DistributedDataParallel
-from svaedc.architecture import ModelConfig
-from svaedc.episodes import Episodes, split
-from svaedc.model import initialised
-from svaedc.sampling import Shard
-from svaedc.settings import StageSettings, TrainingSettings, Weighting
-from svaedc.training import fit
-from svaedc.context import Workplace
+from svaedc.model.config import ModelConfig
+from svaedc.data.episodes import Episodes, split
+from svaedc.model.svae_dc import initialized_model
+from svaedc.data.samplers import WorkerRank
+from svaedc.training.config import StageSettings, TrainingSettings, Weighting
+from svaedc.training.loop import fit
+from svaedc.training.distributed import DistributedContext
 
 folder, rank, world, joint = Path(sys.argv[1]), *map(int, sys.argv[2:])
 rng = np.random.default_rng(0)
@@ -29,13 +29,13 @@ xi = np.tanh(x @ rng.standard_normal((6, 3 * 40), dtype=np.float32)).reshape(200
 bad = (xi[:, 0] > 0.3).astype(np.float32)
 halves = split(Episodes(x, xi, bad, bad.mean(1), np.arange(200)), np.arange(9, 200, 10))
 config = ModelConfig(6, 3, 40, channels=(8, 16), rank=10, prior_hidden=(16,), badness_hidden=(8,))
-model = initialised(config, halves[0], ([-1.0] * 3, [1.0] * 3), seed=0)
+model = initialized_model(config, halves[0], ([-1.0] * 3, [1.0] * 3), seed=0)
 stage = StageSettings(joint, "adam", "cosine", 1e-3, 0.0, 0.0, 1.0)
 settings = TrainingSettings(stage, replace(stage, updates=20), Weighting(1.0, 1.0, 0.0), 32, epoch_updates=10)
 if world > 1:
     init_process_group("gloo", init_method=f"file://{folder}/meeting", rank=rank, world_size=world)
 wrap = DistributedDataParallel if world > 1 else lambda module: module
-list(fit(model, *halves, settings, context=Workplace(Shard(rank, world), parallelise=wrap)))
+list(fit(model, *halves, settings, context=DistributedContext(WorkerRank(rank, world), parallelise=wrap)))
 torch.save(model.state_dict(), folder / f"{rank}.pt")
 if world > 1:
     destroy_process_group()

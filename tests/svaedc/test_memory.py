@@ -12,11 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 import numpy as np
 import torch
-from svaedc.architecture import ModelConfig
-from svaedc.episodes import Episodes, split
-from svaedc.model import initialised
-from svaedc.settings import StageSettings, TrainingSettings, Weighting
-from svaedc.training import fit
+from svaedc.model.config import ModelConfig
+from svaedc.data.episodes import Episodes, split
+from svaedc.model.svae_dc import initialized_model
+from svaedc.training.config import StageSettings, TrainingSettings, Weighting
+from svaedc.training.loop import fit
 
 count, observations, steps = 50_000, 10, 400
 torch.set_num_threads(1)
@@ -38,7 +38,7 @@ except MemoryError:
     print("too large for memory")
 halves = split(Episodes(*arrays, np.arange(count)), np.arange(9, count, 10))
 config = ModelConfig(4, observations, steps, channels=(4,), rank=8, prior_hidden=(8,), badness_hidden=(8,))
-model = initialised(config, halves[0], ([0.0] * observations, [1.0] * observations), seed=0)
+model = initialized_model(config, halves[0], ([0.0] * observations, [1.0] * observations), seed=0)
 joint = StageSettings(10, "adam", "cosine", 1e-3, 0.0, 0.0, 1.0)
 settings = TrainingSettings(joint, joint, Weighting(1.0, 1.0, 0.0), batch_size=64, epoch_updates=10)
 print("updates", list(fit(model, *halves, settings))[-1].update)

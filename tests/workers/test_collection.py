@@ -25,7 +25,7 @@ COLLECT = """
 import os, resource, signal, sys
 from pathlib import Path
 from workers import setups
-from workers.collection import collect_shard
+from workers.collection.shard import collect_shard
 from workers.dataset.folder import open_dataset
 
 dataset, largest_file, last = open_dataset(Path(sys.argv[1])), int(sys.argv[2]), sys.argv[3]

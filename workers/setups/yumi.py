@@ -46,8 +46,8 @@ UPPER = (2.353, 0.607, 1.0, 0.6, 4.049, 1.927, 3.197)
 
 
 REHEARSAL_SHARE = 0.2
-"""Share of the arm's joint speeds: a reading of the paper's "1/5". The authors' code notes 0.1 for the robot, at
-which next to nothing is pushed (docs/yumi.md)."""
+"""Share of the arm's joint speeds: a reading of the paper's "1/5". The authors' code notes 0.1 for the robot,
+at which next to nothing is pushed (docs/yumi.md)."""
 LOWEST_HAND = 0.09
 """Metres above the table; lower, the gripper is about to hit it."""
 

@@ -241,7 +241,7 @@ from cluster.config import HardwareSettings, RaySettings, TrackingSettings
 from cluster.hardware.driver import start
 from cluster.hardware.identity import Approval
 from cluster.hardware.plan import CampaignPlan, identify
-from cluster.session import connect
+from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
 
 if __name__ == "__main__":

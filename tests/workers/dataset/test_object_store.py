@@ -170,7 +170,7 @@ def test_a_shard_that_fails_while_it_is_written_leaves_nothing(place, identity):
 
 UPLOAD = """
 import sys
-from workers.dataset.location import location
+from workers.dataset.storage.location import location
 location(sys.argv[1]).write_bytes(bytes(int(sys.argv[2])))
 """
 
