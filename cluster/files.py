@@ -53,10 +53,66 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
         os.close(descriptor)
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a file as a whole; what was there stays when there is no room."""
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Turns a folder of results that is full or read-only into one message.
+
+    Args:
+        folder: that `--out` names.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        UserError: something in it cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise disk_error(folder, str(error)) from error
+
+
+def disk_error(folder: Path, reason: str) -> UserError:
+    """The message for a folder of results that cannot be written, with the remedy.
+
+    Args:
+        folder: that `--out` names.
+        reason: what the disk said.
+
+    Returns:
+        The error, to be raised.
+    """
+    return UserError(
+        f"cannot write to {folder}: {reason}; make room, or choose another folder with --out. "
+        "Everything finished is kept, and the same command goes on"
+    )
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file as a whole; what was there stays when there is no room.
+
+    Args:
+        path: of the file.
+        text: its content.
+
+    Raises:
+        OSError: it cannot be written.
+    """
     with replacing(path) as unfinished:
-        unfinished.write_text(json.dumps(content, indent=2) + "\n")
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a file as a whole; what was there stays when there is no room.
+
+    Args:
+        path: of the file.
+        content: plain values.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    write_text(path, json.dumps(content, indent=2) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -1,5 +1,6 @@
-"""A trained model that a user names, by its folder or its file."""
+"""A trained model that a user names, by its folder or its file: the one place where one is loaded."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,12 +18,15 @@ class TrainedModel(NamedTuple):
 
 
 def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
-    """The model in a folder or file.
+    """The model in a folder or file, its parameters frozen.
 
     Args:
         path: folder that `svaedc train` left, or the checkpoint in it.
         setup: that it must have been trained on.
-        twin: another setup that will do as well.
+        twin: another setup that will do as well; "" for none.
+
+    Returns:
+        The model, its file and its metadata.
 
     Raises:
         UserError: it cannot be read, or was trained on another setup.
@@ -34,4 +38,19 @@ def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
         checkpoint.require(file, metadata, {"setup": trained_on})
     except (FileNotFoundError, ValueError) as error:
         raise UserError(f"cannot use the model: {error}") from error
-    return TrainedModel(file, model, metadata)
+    return TrainedModel(file, model.requires_grad_(requires_grad=False), metadata)
+
+
+@cache
+def shared_model(path: Path, setup: str, twin: str = "") -> SvaeDc:
+    """The same model, loaded once in a process, however many runs use it.
+
+    Args:
+        path: of the checkpoint.
+        setup: that it must have been trained on.
+        twin: another setup that will do as well; "" for none.
+
+    Returns:
+        The model alone.
+    """
+    return trained_model(path, setup, twin).model

@@ -1,17 +1,40 @@
 """Random generators that depend on (seed, stream, index) alone, whoever draws and in whatever order."""
 
 import zlib
+from enum import StrEnum
 
 import numpy as np
 
 
-def generator(seed: int, stream: str, index: int) -> np.random.Generator:
+class Stream(StrEnum):
+    """What is drawn. Streams are independent of each other; a name decides every draw, so none ever changes."""
+
+    CONTROLLER = "controller"
+    """The x of an episode of a dataset; the index is that of the controller."""
+    PHYSICS = "physics"
+    """The physics of an episode of a dataset; the index is that of the episode."""
+    HIDDEN_PHYSICS = "hidden-physics"
+    """The physics that a run or a rehearsal hides; the index is 0."""
+    POOL = "pool"
+    """The controllers that a run may choose from; the index is 0."""
+    INITIAL = "initial"
+    """The random controllers that a run begins with; the index is that of the trial."""
+    SUGGESTION = "suggestion"
+    """What a method draws for a suggestion; the index is that of the trial."""
+    BOOTSTRAP = "bootstrap"
+    """The resamples of a summary; the index is 0."""
+
+
+def generator(seed: int, stream: Stream, index: int) -> np.random.Generator:
     """A generator of its own for every (seed, stream, index).
 
     Args:
         seed: of the dataset, comparison or campaign, at least 0.
-        stream: what is drawn, such as "controller", "physics" or "pool".
+        stream: what is drawn.
         index: of the episode, run or trial, at least 0.
+
+    Returns:
+        Always the same one for the same arguments.
 
     Raises:
         ValueError: when seed or index is negative.

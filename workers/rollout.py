@@ -19,7 +19,7 @@ from jaxtyping import Float32, UInt8
 from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
 from workers.tasks.task import Bad, check_bad, require_objective
@@ -100,8 +100,8 @@ def random_episode(
         ValueError: as `rollout` does, or the objective is not finite, which no dataset can hold; a trial of
             Bayesian optimisation without one counts as failed.
     """
-    x = generator(seed, "controller", index // repeats).random(setup.dimensions, dtype=np.float32)
-    episode = rollout(setup, environment, x, setup.physics.draw(generator(seed, "physics", index)))
+    x = generator(seed, Stream.CONTROLLER, index // repeats).random(setup.dimensions, dtype=np.float32)
+    episode = rollout(setup, environment, x, setup.physics.draw(generator(seed, Stream.PHYSICS, index)))
     require_objective(setup.task, episode.f)
     return episode
 

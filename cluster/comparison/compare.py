@@ -1,20 +1,19 @@
 """`svaedc compare`: submit the missing runs of a plan to Ray Tune, gather their trials, record."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cluster.comparison.folder import alone_in, claim
+from cluster.comparison.folder import FIGURE, PAGE, SUMMARY, TABLE
 from cluster.comparison.plan import ComparisonPlan, run_parameters
-from cluster.comparison.records import TABLE, RunKey, all_runs, read_trials, seeds_in
-from cluster.comparison.report import FIGURE, PAGE, SUMMARY, lines, publish, summary_of
+from cluster.comparison.records import RunKey, Runs
+from cluster.comparison.report import lines, publish, summary_of
 from cluster.comparison.tracking import Note, TrackedComparison, begin, note_in
 from cluster.comparison.tune import BestSoFar, Watch, submit
 from cluster.progress import ProgressLine, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 from svaedc.analysis.summary import Summary
-from svaedc.bo.loop import Trial
 
 
 @dataclass(frozen=True)
@@ -44,57 +43,57 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
     """
     folder = plan.job.folder
     session.preflight(plan.slots)
-    with alone_in(folder):
-        plan.grid.require_purpose(folder, seeds_in(folder))
-        parameters = {**claim(folder, plan.identity, plan.model), **plan.parameters}
-        note = note_in(folder, tracker)
-        runs = dict(all_runs(folder))
+    with folder.alone():
+        parameters = {**plan.claim(), **plan.parameters}
+        note, runs = note_in(folder, tracker), folder.runs()
         plan.require_length(runs)
         if _is_finished(plan, note, runs):
             say(f"{folder} holds the whole comparison: nothing to do")
-            summary = summary_of(plan.job, plan.setup, list(runs.items()))
-            return Comparison(summary, Run(tracker, note.run).url)
+            return Comparison(summary_of(plan.job, plan.setup, runs), Run(tracker, note.run).url)
         tracked = begin(folder, tracker, f"compare {plan.setup.name}", parameters)
         with tracked.run:
             _submit(plan, tracked, runs)
             return Comparison(_record(plan, tracked, parameters), tracked.run.url)
 
 
-def _is_finished(plan: ComparisonPlan, note: Note, runs: Mapping[RunKey, Sequence[Trial]]) -> bool:
+def _is_finished(plan: ComparisonPlan, note: Note, runs: Runs) -> bool:
     """Whether all runs asked for are whole, and both the folder and MLflow have the results of all trials."""
     whole = not plan.missing(runs) and note.trials == sum(map(len, runs.values()))
-    return whole and all((plan.job.folder / name).exists() for name in (TABLE, SUMMARY, FIGURE, PAGE))
+    return whole and plan.job.folder.holds((TABLE, SUMMARY, FIGURE, PAGE))
 
 
-def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
-    folder, keys, length = plan.job.folder, plan.grid.keys(), plan.job.length
+def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Runs) -> None:
+    """Run what is missing, show it, and record every run that is whole."""
     missing = plan.missing(runs)
     if not missing:
         return
 
-    def ended(key: RunKey) -> None:
-        trials = read_trials(key.path(folder))
-        if len(trials) >= length:
+    def record_end(key: RunKey) -> None:
+        trials = plan.job.folder.trials(key)
+        if len(trials) >= plan.job.length:
             tracked.try_child(key, trials)
 
-    standing = BestSoFar(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
+    keys, length = plan.grid.keys(), plan.job.length
+    best = BestSoFar(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
     done = sum(min(len(runs.get(key, ())), length) for key in keys)
     with ProgressLine("trials", len(keys) * length, done) as progress:
-        submit(plan.job, missing, plan.slots, Watch(progress, standing, ended))
+        submit(plan.job, missing, plan.slots, Watch(progress, best, record_end))
 
 
 def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
-    runs = list(all_runs(plan.job.folder))
+    """Summarise all runs of the folder, for people and for MLflow."""
+    folder = plan.job.folder
+    runs = folder.runs()
     summary = summary_of(plan.job, plan.setup, runs)
-    settings = {**parameters, **run_parameters(key for key, _ in runs), "MLflow run": tracked.run.url}
+    settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.url}
     report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
     for line in lines(summary):
         say(line)
-    say(f"{plan.job.folder / PAGE}; {tracked.run.url}")
+    say(f"{folder.path / PAGE}; {tracked.run.url}")
     asked = set(plan.grid.keys())
-    for key, trials in runs:
+    for key, trials in runs.items():
         if key in asked:
             tracked.child(key, trials)
     curves = {f"best/{name}": [best.mean for best in method.best] for name, method in summary.methods.items()}
-    tracked.complete(report, curves, sum(len(trials) for _, trials in runs))
+    tracked.complete(report, curves, sum(map(len, runs.values())))
     return summary

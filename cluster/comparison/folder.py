@@ -1,92 +1,158 @@
 """The folder of a comparison: it holds one comparison, and one command at a time works in it."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cluster import files
-from cluster.comparison.records import RUNS
+from cluster.comparison.records import NAME, RUNS, RunKey, Runs, append, read_trials, write_table
 from cluster.errors import UserError
-from cluster.files import replacing
+from svaedc.bo.loop import Trial
 
 IDENTITY = "comparison.json"
+TABLE = "trials.parquet"
+SUMMARY = "summary.json"
+FIGURE = "figure.png"
+PAGE = "report.html"
 
 
-@contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Turns a disk that is full or read-only into one message."""
-    try:
-        yield
-    except OSError as error:
-        raise disk_error(folder, str(error)) from error
+@dataclass(frozen=True)
+class ComparisonFolder:
+    """The files of one comparison.
 
-
-def disk_error(folder: Path, reason: str) -> UserError:
-    """The message for a folder that cannot be written, with the remedy."""
-    return UserError(
-        f"cannot write to {folder}: {reason}; make room, or choose another folder with --out. "
-        "Everything finished is kept, and the same command goes on"
-    )
-
-
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Keeps other commands out of the folder, which is created first; a dead one keeps nobody out.
-
-    Raises:
-        UserError: another command works in it, or it cannot be written.
+    Attributes:
+        path: of the folder, absolute.
     """
-    with writing(folder):
-        (folder / RUNS).mkdir(parents=True, exist_ok=True)
-    refusal = (
-        f"another comparison is at work in {folder}; wait for its end, or choose another folder with --out"
-    )
-    with files.alone_in(folder, refusal):
-        yield
 
+    path: Path
 
-def claim(folder: Path, identity: Mapping[str, Any], model: str) -> dict[str, Any]:
-    """Begin a comparison in a folder, or check that the one in it is this one; returns its identity.
+    def __str__(self) -> str:
+        return str(self.path)
 
-    Args:
-        folder: of the comparison.
-        identity: what all its runs have in common.
-        model: hash of the model; "" when no method asked for needs one. It becomes part of the comparison
-            with the first method that does.
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keeps other commands out of the folder, which is created first; a dead one keeps nobody out.
 
-    Raises:
-        UserError: the folder holds another comparison, or its `comparison.json` is damaged or gone.
-    """
-    path = folder / IDENTITY
-    found = _read(path, identity) if _has_runs(folder) else {**identity, "model": ""}
-    wanted = {**identity, "model": model or found["model"]}
-    for name, value in wanted.items():
-        if found[name] not in (value, ""):
-            raise UserError(
-                f"{folder} holds a comparison with {name} {found[name]!r}, not {value!r}; "
-                "choose another folder with --out"
-            )
-    if wanted != found or not path.exists():
-        with writing(folder), replacing(path) as unfinished:
-            unfinished.write_text(json.dumps(wanted, indent=2) + "\n")
-    return wanted
+        Raises:
+            UserError: another command works in it, or it cannot be written.
+        """
+        with files.writing(self.path):
+            (self.path / RUNS).mkdir(parents=True, exist_ok=True)
+        refusal = (
+            f"another comparison is at work in {self}; wait for its end, or choose another folder with --out"
+        )
+        with files.alone_in(self.path, refusal):
+            yield
 
+    def write(self, name: str, text: str) -> Path:
+        """Write one of the folder's files; it is whole, or as it was before.
 
-def _has_runs(folder: Path) -> bool:
-    return (folder / IDENTITY).exists() or any((folder / RUNS).iterdir())
+        Args:
+            name: of the file.
+            text: its whole content.
 
+        Returns:
+            Where it lies.
 
-def _read(path: Path, identity: Mapping[str, Any]) -> dict[str, Any]:
-    try:
-        found = {"setup_digest": "", **json.loads(path.read_text())}  # which earlier comparisons lack
-        return {name: found[name] for name in (*identity, "model")}
-    except FileNotFoundError as error:
-        reason = "is gone, though there are runs"
-        raise _unknown(path, reason) from error
-    except (ValueError, TypeError, KeyError) as error:
-        raise _unknown(path, "is damaged") from error
+        Raises:
+            UserError: the disk takes no more.
+        """
+        with files.writing(self.path):
+            files.write_text(self.path / name, text)
+        return self.path / name
+
+    def claim(self, identity: Mapping[str, Any], model: str) -> dict[str, Any]:
+        """Begin a comparison here, or check that the one that is here is this one.
+
+        Args:
+            identity: what all its runs have in common.
+            model: hash of the model; "" when no method asked for needs one. It becomes part of the comparison
+                with the first method that does.
+
+        Returns:
+            The identity of the comparison, the model's hash included.
+
+        Raises:
+            UserError: the folder holds another comparison, or its `comparison.json` is damaged or gone.
+        """
+        found = self._identity(identity) if self._has_begun() else {**identity, "model": ""}
+        wanted = {**identity, "model": model or found["model"]}
+        for name, value in wanted.items():
+            if found[name] not in (value, ""):
+                raise UserError(
+                    f"{self} holds a comparison with {name} {found[name]!r}, not {value!r}; "
+                    "choose another folder with --out"
+                )
+        if wanted != found or not (self.path / IDENTITY).exists():
+            self.write(IDENTITY, json.dumps(wanted, indent=2) + "\n")
+        return wanted
+
+    def trials(self, key: RunKey) -> list[Trial]:
+        """The trials of a run so far.
+
+        Raises:
+            UserError: its record is damaged.
+        """
+        return read_trials(key.path(self.path))
+
+    def append(self, key: RunKey, trial: Trial) -> None:
+        """Add a trial to the record of a run; it is on disk when this returns.
+
+        Args:
+            key: of the run.
+            trial: its next one.
+
+        Raises:
+            OSError: the disk takes no more.
+        """
+        append(key.path(self.path), trial)
+
+    def keys(self) -> list[RunKey]:
+        """Every run that has begun, in order; of files that are no run's, such as copies, nothing is said."""
+        matches = (NAME.fullmatch(path.name) for path in (self.path / RUNS).glob("*.jsonl"))
+        return sorted(RunKey(match["method"], int(match["run"])) for match in matches if match)
+
+    def runs(self) -> dict[RunKey, list[Trial]]:
+        """The trials of every run that has begun, in order."""
+        return {key: self.trials(key) for key in self.keys()}
+
+    def write_table(self, runs: Runs, facts: Mapping[str, str]) -> Path:
+        """`trials.parquet`: one row per trial of all runs.
+
+        Args:
+            runs: all trials.
+            facts: the columns that all rows share, by name.
+
+        Returns:
+            Where it lies.
+
+        Raises:
+            UserError: the disk takes no more.
+        """
+        with files.writing(self.path):
+            write_table(self.path / TABLE, runs, facts)
+        return self.path / TABLE
+
+    def holds(self, names: Iterable[str]) -> bool:
+        """Whether all of these files are here."""
+        return all((self.path / name).exists() for name in names)
+
+    def _has_begun(self) -> bool:
+        return (self.path / IDENTITY).exists() or any((self.path / RUNS).iterdir())
+
+    def _identity(self, expected: Mapping[str, Any]) -> dict[str, Any]:
+        path = self.path / IDENTITY
+        try:
+            # Comparisons of before lack the digest.
+            found = {"setup_digest": "", **json.loads(path.read_text(encoding="utf-8"))}
+            return {name: found[name] for name in (*expected, "model")}
+        except FileNotFoundError as error:
+            raise _unknown(path, "is gone, though there are runs") from error
+        except (ValueError, TypeError, KeyError) as error:
+            raise _unknown(path, "is damaged") from error
 
 
 def _unknown(path: Path, reason: str) -> UserError:

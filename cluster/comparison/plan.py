@@ -1,11 +1,12 @@
 """What a comparison is of; what cannot be compared is refused here, before Ray and before the first run."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cluster.comparison.records import RunKey
+from cluster.comparison.folder import ComparisonFolder
+from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.worker import ComparisonJob
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
@@ -14,7 +15,6 @@ from cluster.models import trained_model
 from cluster.progress import say
 from svaedc.analysis.seeds import common_purpose
 from svaedc.bo import methods
-from svaedc.bo.loop import Trial
 from workers.dataset.shards import sha256
 from workers.hardware import robots
 from workers.physics import ranges
@@ -69,7 +69,7 @@ class Grid:
                 f"{', '.join(self.with_model())} need a trained model: name its folder with --model"
             )
 
-    def require_purpose(self, folder: Path, seeds: Iterable[int]) -> None:
+    def require_purpose(self, folder: ComparisonFolder, seeds: Iterable[int]) -> None:
         """Refuse to mix runs for tuning and runs for reporting in one folder.
 
         Raises:
@@ -140,11 +140,23 @@ class ComparisonPlan:
             **({"model_trained_on": self.trained_on} if self.trained_on else {}),
         }
 
-    def missing(self, runs: Mapping[RunKey, Sequence[Trial]]) -> list[RunKey]:
+    def claim(self) -> dict[str, Any]:
+        """Begin the comparison in its folder, or check that the one that is there is this one.
+
+        Returns:
+            What all its runs have in common, the model included.
+
+        Raises:
+            UserError: the folder holds another comparison, or runs whose seeds are for something else.
+        """
+        self.grid.require_purpose(self.job.folder, {key.run for key in self.job.folder.keys()})
+        return self.job.folder.claim(self.identity, self.model)
+
+    def missing(self, runs: Runs) -> list[RunKey]:
         """The runs asked for that are not whole."""
         return [key for key in self.grid.keys() if len(runs.get(key, ())) < self.job.length]  # noqa: SIM118
 
-    def require_length(self, runs: Mapping[RunKey, Sequence[Trial]]) -> None:
+    def require_length(self, runs: Runs) -> None:
         """Refuse runs that would never be compared, and name those that no longer will: the longest are.
 
         Raises:
@@ -195,7 +207,7 @@ def plan_comparison(
     grid.require(model)
     path, trained_on = usable(model, setup) if grid.with_model() and model else (None, setup.name)
     job = ComparisonJob(
-        folder=folder.resolve(),
+        folder=ComparisonFolder(folder.resolve()),
         setup=setup.name,
         gap=str(ranges(gap)) if "=" in gap else gap,  # so that equal ranges are one comparison
         model=str(path.resolve()) if path else "",

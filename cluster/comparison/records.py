@@ -4,7 +4,7 @@ import fcntl
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count, takewhile
 from pathlib import Path
@@ -20,8 +20,7 @@ from svaedc.analysis.summary import Row
 from svaedc.bo.loop import Trial
 
 RUNS = "runs"
-TABLE = "trials.parquet"
-_NAME = re.compile(r"(?P<method>.+)-(?P<run>\d{5,})\.jsonl")
+NAME = re.compile(r"(?P<method>.+)-(?P<run>\d{5,})\.jsonl")
 
 
 @dataclass(frozen=True, order=True)
@@ -39,7 +38,8 @@ class RunKey:
         return folder / RUNS / f"{self.method}-{self.run:05d}.jsonl"
 
 
-Runs = Sequence[tuple[RunKey, list[Trial]]]
+Runs = Mapping[RunKey, list[Trial]]
+"""All trials of all runs, in order."""
 
 
 def append(path: Path, trial: Trial) -> None:
@@ -91,44 +91,33 @@ def _trial(line: dict[str, Any]) -> Trial:
     return Trial(index=line.pop("trial"), x=x, **line)
 
 
-def all_runs(folder: Path) -> Iterator[tuple[RunKey, list[Trial]]]:
-    """Every run of a comparison that has begun, in order."""
-    for key in sorted(_run_keys(folder)):
-        yield key, read_trials(key.path(folder))
-
-
-def seeds_in(folder: Path) -> set[int]:
-    """Of all runs that have begun."""
-    return {key.run for key in _run_keys(folder)}
-
-
-def _run_keys(folder: Path) -> Iterator[RunKey]:
-    """Of files that are no run's, such as copies, nothing is said."""
-    for path in (folder / RUNS).glob("*.jsonl"):
-        match = _NAME.fullmatch(path.name)
-        if match:
-            yield RunKey(match["method"], int(match["run"]))
-
-
 def rows(runs: Runs) -> list[Row]:
     """What the statistics need of every trial."""
     return [
         Row(key.method, key.run, trial.index, trial.f, trial.success)
-        for key, trials in runs
+        for key, trials in runs.items()
         for trial in trials
     ]
 
 
-def write_table(folder: Path, runs: Runs, *, setup: str, gap: str) -> Path:
-    """`trials.parquet`: one row per trial of all runs."""
+def write_table(path: Path, runs: Runs, facts: Mapping[str, str]) -> None:
+    """One row per trial of all runs, in Parquet; the file is whole, or as it was before.
+
+    Args:
+        path: of the file.
+        runs: all trials.
+        facts: the columns that all rows share, by name.
+
+    Raises:
+        OSError: the disk takes no more.
+    """
     records = [
-        {"setup": setup, "gap": gap, "method": key.method, "run": key.run, **_fields(trial)}
-        for key, trials in runs
+        {**facts, "method": key.method, "run": key.run, **_fields(trial)}
+        for key, trials in runs.items()
         for trial in trials
     ]
-    with replacing(folder / TABLE) as path:
-        pq.write_table(pa.Table.from_pylist(records), path, compression="zstd")
-    return folder / TABLE
+    with replacing(path) as unfinished:
+        pq.write_table(pa.Table.from_pylist(records), unfinished, compression="zstd")
 
 
 def _fields(trial: Trial) -> dict[str, Any]:

@@ -8,21 +8,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from cluster import files
 from cluster.comparison import figure
-from cluster.comparison.folder import writing
+from cluster.comparison.folder import FIGURE, PAGE, SUMMARY
 from cluster.comparison.html import page
-from cluster.comparison.records import Runs, rows, write_table
+from cluster.comparison.records import Runs, rows
 from cluster.comparison.worker import ComparisonJob
-from cluster.files import replacing
 from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Summary
 from workers.hardware import robots
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.setups import Setup
 
-SUMMARY = "summary.json"
-FIGURE = "figure.png"
-PAGE = "report.html"
 _VERSIONS = ("svaedc", "torch", "gpytorch", "botorch", "numpy", "pybullet", "ray")
 
 
@@ -37,7 +34,7 @@ class Report:
 def summary_of(job: ComparisonJob, setup: Setup, runs: Runs) -> Summary:
     """Means, intervals and paired differences over all runs of the folder."""
     reporting = Reporting(initial=job.initial, broken_below=setup.broken)
-    return summarize(rows(runs), reporting, generator(0, "bootstrap", 0))
+    return summarize(rows(runs), reporting, generator(0, Stream.BOOTSTRAP, 0))
 
 
 def publish(
@@ -61,24 +58,20 @@ def publish(
     Raises:
         UserError: the disk is full.
     """
-    path = job.folder / SUMMARY
-    title = _title(job, setup, caption)
-    with writing(job.folder):
-        table = write_table(job.folder, runs, setup=job.setup, gap=job.gap)
-        with replacing(path) as unfinished:
-            unfinished.write_text(json.dumps({"title": title, **summary.as_json()}, indent=2) + "\n")
+    folder, title = job.folder, _title(job, setup, caption)
+    table = folder.write_table(runs, {"setup": job.setup, "gap": job.gap})
+    written = folder.write(SUMMARY, json.dumps({"title": title, **summary.as_json()}, indent=2) + "\n")
+    with files.writing(folder.path):
         drawn = figure.best_so_far(
-            job.folder / FIGURE,
+            folder.path / FIGURE,
             summary,
             title=title,
             initial=job.initial,
             limits=setup.objective_limits,
         )
-        versions = {f"version of {name}": version(name) for name in _VERSIONS}
-        written = page(title, summary, drawn[1:], job.initial, {**settings, **versions})
-        with replacing(job.folder / PAGE) as unfinished:
-            unfinished.write_text(written, encoding="utf-8")
-    return Report((table, path, job.folder / PAGE), drawn)
+    versions = {f"version of {name}": version(name) for name in _VERSIONS}
+    report = folder.write(PAGE, page(title, summary, drawn[1:], job.initial, {**settings, **versions}))
+    return Report((table, written, report), drawn)
 
 
 def _title(job: ComparisonJob, setup: Setup, caption: str) -> str:

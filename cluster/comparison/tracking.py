@@ -4,14 +4,12 @@ import json
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
-from cluster.comparison.folder import writing
+from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.report import Report
 from cluster.errors import UserError
-from cluster.files import replacing
 from cluster.progress import say
 from cluster.tracking import Run, Tracker
 from svaedc.bo.loop import Trial
@@ -36,20 +34,22 @@ class Note:
     trials: int = 0
 
 
-def note_in(folder: Path, tracker: Tracker) -> Note:
+def note_in(folder: ComparisonFolder, tracker: Tracker) -> Note:
     """The note of a folder, if it speaks of this store.
 
     One that is damaged, or speaks of another store, counts for nothing: MLflow then gets everything again.
     """
     with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
-        content = json.loads((folder / NOTE).read_text())
+        content = json.loads((folder.path / NOTE).read_text(encoding="utf-8"))
         note = Note(**{**content, "children": tuple(content["children"])})
         if tracker.holds(note.run):
             return note
     return Note()
 
 
-def begin(folder: Path, tracker: Tracker, name: str, parameters: Mapping[str, Any]) -> "TrackedComparison":
+def begin(
+    folder: ComparisonFolder, tracker: Tracker, name: str, parameters: Mapping[str, Any]
+) -> "TrackedComparison":
     """The run that an interrupted command of the same parameters began, or a new one."""
     note = note_in(folder, tracker)
     if note.run and note.parameters == parameters and not note.trials:
@@ -61,7 +61,7 @@ def begin(folder: Path, tracker: Tracker, name: str, parameters: Mapping[str, An
 class TrackedComparison:
     """The parent run of one command, with a child run for every run of the comparison that is whole."""
 
-    def __init__(self, folder: Path, note: Note, run: Run) -> None:
+    def __init__(self, folder: ComparisonFolder, note: Note, run: Run) -> None:
         self._folder = folder
         self._note = note
         self._failed = False
@@ -110,5 +110,4 @@ class TrackedComparison:
         self._save()
 
     def _save(self) -> None:
-        with writing(self._folder), replacing(self._folder / NOTE) as path:
-            path.write_text(json.dumps(asdict(self._note), indent=2) + "\n")
+        self._folder.write(NOTE, json.dumps(asdict(self._note), indent=2) + "\n")

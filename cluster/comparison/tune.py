@@ -5,17 +5,17 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from ray import tune
 from ray.tune import Callback, FailureConfig, ResultGrid, RunConfig, Stopper, TuneConfig, Tuner
 
-from cluster.comparison.folder import disk_error, writing
+from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.worker import ComparisonJob, RunTrainable
 from cluster.errors import UserError
+from cluster.files import disk_error
 from cluster.progress import ProgressLine, say
 from cluster.runtime.tune import silence_tune
 
@@ -121,16 +121,15 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
             ),
         ).fit()
     if watch.disk:
-        raise disk_error(job.folder, watch.disk)
+        raise disk_error(job.folder.path, watch.disk)
     if results.errors:
         raise _failures(job.folder, results, len(missing))
 
 
-def _failures(folder: Path, results: ResultGrid, asked: int) -> UserError:
+def _failures(folder: ComparisonFolder, results: ResultGrid, asked: int) -> UserError:
     texts = [_COLOR.sub("", str(error)).strip() for error in results.errors]
-    with writing(folder):
-        (folder / ERRORS).write_text("\n\n".join(texts) + "\n")
+    errors = folder.write(ERRORS, "\n\n".join(texts) + "\n")
     return UserError(
         f"{len(texts)} of {asked} runs kept failing, the first with: {texts[0].splitlines()[-1]}. "
-        f"All errors are in {folder / ERRORS}. The other runs are kept, and the same command tries again"
+        f"All errors are in {errors}. The other runs are kept, and the same command tries again"
     )

@@ -4,7 +4,6 @@ import errno
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +11,16 @@ import numpy as np
 import torch
 from ray import tune
 
-from cluster.comparison.records import RunKey, append, read_trials
+from cluster.comparison.folder import ComparisonFolder
+from cluster.comparison.records import RunKey
+from cluster.models import shared_model
+from cluster.optimization import Optimization
 from svaedc.bo import methods
-from svaedc.bo.candidates import Problem
-from svaedc.bo.distribution_features import Densities
-from svaedc.bo.features import Latents
 from svaedc.bo.loop import Outcome, Trial, trials
-from svaedc.bo.online import Adjustable
-from svaedc.model import checkpoint
-from svaedc.model.svae_dc import SvaeDc
 from workers import setups
 from workers.environments.environment import Environment
-from workers.randomness import generator
+from workers.hardware import robots
+from workers.randomness import Stream, generator
 from workers.rollout import rollout
 from workers.setups import Setup
 
@@ -46,7 +43,7 @@ class ComparisonJob:
         trials: suggested trials after them.
     """
 
-    folder: Path
+    folder: ComparisonFolder
     setup: str
     gap: str
     model: str
@@ -60,56 +57,71 @@ class ComparisonJob:
         return self.initial + self.trials
 
     def require(self, names: Sequence[str], setup: Setup) -> None:
-        """Refuse what every run of one of these methods would fail of, with a `ValueError`."""
+        """Refuse what every run of one of these methods would fail of, before anything starts.
+
+        Args:
+            names: of the methods.
+            setup: whose controllers are tried.
+
+        Raises:
+            ValueError: a method lacks what it needs, or its pool would run dry.
+        """
         neediest = max(names, key=methods.needs_model)
-        problem = self._problem(RunKey(neediest, 0), setup)  # holds what the others need as well
+        problem = self.optimization(
+            RunKey(neediest, 0), setup
+        ).problem()  # holds what the others need as well
         for name in names:
             methods.require(name, problem, self.trials)
 
     def run(self, key: RunKey, setup: Setup, environment: Environment) -> Iterator[Trial]:
-        """The missing trials of a run; each is on disk before it is yielded."""
-        path = key.path(self.folder)
-        draws = (generator(key.run, "initial", index) for index in range(self.initial))
-        first = [draw.random(setup.dimensions, dtype=np.float32) for draw in draws]
+        """Try what a run still has to try.
+
+        Args:
+            key: of the run.
+            setup: whose controllers are tried.
+            environment: in which; every run of a process may use the same.
+
+        Yields:
+            The missing trials, in order; each is on disk before it is yielded.
+        """
+        planned = self.optimization(key, setup)
         for trial in trials(
-            methods.build(key.method, self._problem(key, setup)),
+            planned.build(),
             evaluation(setup, environment, self.gap, key.run),
-            np.stack(first),
+            np.stack([planned.initial(index) for index in range(self.initial)]),
             self.trials,
-            lambda index: generator(key.run, "suggestion", index),
+            planned.rng,
             time.monotonic,
-            read_trials(path),
+            self.folder.trials(key),
         ):
-            append(path, trial)
+            self.folder.append(key, trial)
             yield trial
 
-    def _problem(self, key: RunKey, setup: Setup) -> Problem:
-        pool = generator(key.run, "pool", 0).random((self.pool_size, setup.dimensions), dtype=np.float32)
-        if not methods.needs_model(key.method):
-            return Problem(setup.dimensions, setup.objective_limits, pool)
-        model = _model(self.model)
-        latents = Latents.of(torch.from_numpy(pool), model.latent_means)
-        return Problem(
-            setup.dimensions, setup.objective_limits, pool, latents, Densities.of(model), Adjustable(model)
-        )
+    def optimization(self, key: RunKey, setup: Setup) -> Optimization:
+        """What decides the controllers of a run.
+
+        Args:
+            key: of the run.
+            setup: whose controllers are tried.
+
+        Returns:
+            With the model, if the run's method needs one.
+        """
+        needs_model = methods.needs_model(key.method)
+        twin = robots.stands_in_for(self.setup)
+        model = shared_model(Path(self.model), self.setup, twin) if needs_model else None
+        return Optimization(setup, key.method, key.run, self.pool_size, model)
 
 
 def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:
     """What one run maximises: the setup under hidden physics, drawn once from the gap's ranges."""
-    physics = setup.gap(gap).draw(generator(run, "hidden-physics", 0))
+    physics = setup.gap(gap).draw(generator(run, Stream.HIDDEN_PHYSICS, 0))
 
     def evaluate(x: np.ndarray) -> Outcome:
         episode = rollout(setup, environment, x, physics)
         return Outcome(f=episode.f, y=episode.y, success=episode.f > setup.success, stop=episode.stop)
 
     return evaluate
-
-
-@cache
-def _model(path: str) -> SvaeDc:
-    """Loaded once in a process, however many runs it does."""
-    model, _ = checkpoint.load(Path(path))
-    return model.requires_grad_(requires_grad=False)
 
 
 class RunTrainable(tune.Trainable):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -13,10 +13,30 @@ from cluster.hardware.states import TERMINAL, State
 from cluster.hardware.status import RANDOM_TRIALS, Phase, phase_of
 from svaedc.bo.history import History
 from workers.hardware.driver import RobotDriver, RobotFault
-from workers.randomness import generator
 
-Suggest = Callable[[History, np.random.Generator], np.ndarray]
-Predict = Callable[[np.ndarray], float | None]
+
+class Proposer(Protocol):
+    """Where controllers come from; a pure function of the campaign's identity and its arguments."""
+
+    def random(self, index: int) -> np.ndarray:
+        """The random controller, [D], of one of the first trials."""
+        ...
+
+    def suggest(self, history: History, index: int) -> np.ndarray:
+        """The controller, [D], of a later trial.
+
+        Args:
+            history: what was measured.
+            index: of the trial.
+
+        Returns:
+            A point of the unit cube.
+        """
+        ...
+
+    def predict(self, x: np.ndarray) -> float | None:
+        """Badness of a controller in [0, 1] as the model expects it; None without a model."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -26,8 +46,7 @@ class Campaign:
     Attributes:
         journal: the truth about every trial.
         robot: that is moved.
-        suggest: the method, a pure function of history and generator.
-        predict: badness of a controller in [0, 1] as the model expects it; None without a model.
+        proposals: where controllers come from.
         dimensions: D of the robot's setup.
         process: the host, boot and process id that act, kept as evidence.
         versions: of the libraries that compute proposals, kept as evidence.
@@ -35,8 +54,7 @@ class Campaign:
 
     journal: Journal
     robot: RobotDriver
-    suggest: Suggest
-    predict: Predict
+    proposals: Proposer
     dimensions: int
     process: Mapping[str, Any]
     versions: Mapping[str, str]
@@ -121,12 +139,12 @@ def _step(campaign: Campaign) -> CampaignTrial:
 
 def propose(campaign: Campaign) -> CampaignTrial:
     """Stores the next controller, a function of the journal alone: a kill before or after changes nothing."""
-    trials, seed = campaign.journal.trials(), campaign.journal.identity.seed
+    trials = campaign.journal.trials()
     number, past = len(trials), history(trials, campaign.dimensions)
     if len(past) < RANDOM_TRIALS:
-        kind, x = "random", generator(seed, "initial", number).random(campaign.dimensions)
+        kind, x = "random", campaign.proposals.random(number)
     else:
-        kind, x = "suggested", campaign.suggest(past, generator(seed, "suggestion", number))
+        kind, x = "suggested", campaign.proposals.suggest(past, number)
     facts = {
         "based_on": [trial.number for trial in trials if trial.state is State.MEASURED],
         "versions": campaign.versions,
@@ -140,7 +158,7 @@ def _check(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     reason = objection(trial.x, campaign.dimensions)
     if reason is not None:
         return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": reason})
-    facts = {"predicted_y": campaign.predict(trial.x)}
+    facts = {"predicted_y": campaign.proposals.predict(trial.x)}
     return record(campaign.journal, trial, State.CHECKED, "limits", facts)
 
 

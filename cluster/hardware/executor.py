@@ -77,14 +77,12 @@ def _journal(plan: CampaignPlan) -> Journal:
 
 
 def _campaign(plan: CampaignPlan, opened: Journal) -> Campaign:
-    identity = plan.identity
+    identity = opened.identity  # a campaign of before keeps its version of draws
     setup = setups.load(identity.setup)
-    proposals = Proposals.of(identity, setup, plan.model)
     return Campaign(
         journal=opened,
         robot=robots.find(identity.robot).connect(identity.seed, plan.pace, plan.folder),
-        suggest=proposals.suggest,
-        predict=proposals.predicted_badness,
+        proposals=Proposals.of(identity, setup, plan.model),
         dimensions=setup.dimensions,
         process=asdict(Process.current()),
         versions=library_versions(),

@@ -1,8 +1,9 @@
 """What makes a hardware campaign this one and no other."""
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 from cluster.errors import UserError
 from cluster.hardware.events import canonical
@@ -32,6 +33,8 @@ class CampaignIdentity:
         pool: number of random controllers the method chooses from, at least 1.
         trials: suggested trials after the random ones, at least 0.
         approval: who lets a controller onto the robot.
+        draws: version of how controllers are drawn, `cluster.optimization.DRAWS`; nobody asks for one, a
+            campaign keeps the one that it began with.
     """
 
     robot: str
@@ -42,6 +45,7 @@ class CampaignIdentity:
     pool: int
     trials: int
     approval: Approval
+    draws: int = 1
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -53,7 +57,11 @@ class CampaignIdentity:
 
     def genesis(self, name: str) -> str:
         """Hash that the first event of the campaign called `name` follows."""
-        return hashlib.sha256(canonical({**asdict(self), "name": name}).encode()).hexdigest()
+        return hashlib.sha256(canonical({**self.facts(), "name": name}).encode()).hexdigest()
+
+    def facts(self) -> dict[str, Any]:
+        """All fields by name; `draws` came later than the first campaigns, and is left out where it is theirs."""
+        return {field: value for field, value in asdict(self).items() if (field, value) != ("draws", 1)}
 
     def require(self, asked: "CampaignIdentity", place: str) -> None:
         """Refuses another campaign in the same folder.
@@ -65,7 +73,7 @@ class CampaignIdentity:
         Raises:
             IdentityMismatch: naming the first field that differs.
         """
-        for field, here in asdict(self).items():
+        for field, here in asdict(replace(self, draws=asked.draws)).items():
             there = getattr(asked, field)
             if here != there:
                 raise IdentityMismatch(

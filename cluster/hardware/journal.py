@@ -178,14 +178,16 @@ class Journal:
     def _campaign(self) -> tuple[str, CampaignIdentity]:
         if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
             raise _absent(self.path)
-        query = "SELECT name, robot, setup, method, seed, model, pool, trials, approval FROM campaign"
         try:
-            row = self._connection.execute(query).fetchone()
+            # Journals of svaedc 0.1.0 have no column `draws`.
+            row = self._connection.execute("SELECT * FROM campaign").fetchone()
             if row is None:
                 raise corrupt(self.path, "it names no campaign")
-            name, robot, setup, method, seed, model, pool, trials, approval = row
-            return name, CampaignIdentity(robot, setup, method, seed, model, pool, trials, Approval(approval))
-        except ValueError as error:
+            _, name, robot, setup, method, seed, model, pool, trials, approval, *draws = row
+            return name, CampaignIdentity(
+                robot, setup, method, seed, model, pool, trials, Approval(approval), *draws
+            )
+        except (ValueError, TypeError) as error:
             raise corrupt(self.path, str(error)) from error
 
     def _head(self) -> tuple[int, str]:
@@ -222,9 +224,12 @@ def create(path: Path, name: str, identity: CampaignIdentity) -> None:
     """
     values = (name, *astuple(identity))
     with sqlite_errors(path), closing(connect(path)) as connection, writing(connection):
+        if connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone():
+            return
         for statement in SCHEMA:
             connection.execute(statement)
-        connection.execute("INSERT OR IGNORE INTO campaign VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
+        marks = ", ".join("?" for _ in values)
+        connection.execute(f"INSERT INTO campaign VALUES (1, {marks})", values)
 
 
 def _absent(path: Path) -> JournalError:

@@ -92,7 +92,7 @@ def close_abandoned(folder: Path, patience: float) -> None:
 def export(folder: Path) -> Iterator[str]:
     """The journal as JSON lines: the campaign first, then every event, oldest first."""
     with _open(folder) as opened:
-        yield canonical({"campaign": opened.name, **asdict(opened.identity)})
+        yield canonical({"campaign": opened.name, **opened.identity.facts()})
         for event in opened.events():
             yield canonical(asdict(event))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from cluster.errors import UsageError
 from cluster.hardware.identity import Approval, CampaignIdentity
 from cluster.hardware.proposals import fingerprint
+from cluster.optimization import DRAWS
 from svaedc.bo import methods
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
@@ -58,6 +59,6 @@ def identify(
         if needs_model and model is None:
             raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
         digest = fingerprint(model) if needs_model and model else ""
-        return CampaignIdentity(robot, setup, method, seed, digest, pool, trials, approval)
+        return CampaignIdentity(robot, setup, method, seed, digest, pool, trials, approval, DRAWS)
     except (LookupError, ValueError) as error:
         raise UsageError(str(error.args[0])) from error

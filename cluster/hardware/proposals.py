@@ -1,25 +1,23 @@
-"""From a campaign's plan to the method that proposes its controllers."""
+"""From a campaign's identity to what decides its controllers, and to what its model expects of them."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from cluster.errors import UserError
-from cluster.hardware.campaign import Suggest
 from cluster.hardware.identity import CampaignIdentity
+from cluster.models import trained_model
+from cluster.optimization import Optimization
 from svaedc.bo import methods
-from svaedc.bo.candidates import Problem
-from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents
-from svaedc.bo.online import Adjustable
-from svaedc.model import checkpoint
+from svaedc.bo.history import History
+from svaedc.bo.methods import Method
 from svaedc.model.svae_dc import SvaeDc
-from workers.randomness import generator
 from workers.setups import Setup
 
 LIBRARIES = ("numpy", "torch", "gpytorch", "botorch")
@@ -27,36 +25,63 @@ LIBRARIES = ("numpy", "torch", "gpytorch", "botorch")
 
 @dataclass(frozen=True)
 class Proposals:
-    """A campaign's method, and what its model expects of a controller.
+    """Where the controllers of a campaign come from.
 
     Attributes:
-        suggest: the method.
+        optimization: decides them, together with what was measured.
+        method: suggests those after the first.
         latents: of the model; None for a method without one.
     """
 
-    suggest: Suggest
+    optimization: Optimization
+    method: Method
     latents: Latents | None
 
     @classmethod
     def of(cls, identity: CampaignIdentity, setup: Setup, model: Path | None) -> "Proposals":
         """Builds the method from the campaign's identity alone, so that every process builds the same.
 
+        Args:
+            identity: of the campaign.
+            setup: of its robot.
+            model: checkpoint; None for a method without one.
+
+        Returns:
+            The proposals.
+
         Raises:
             LookupError: when there is no such method.
             UserError: when the model is missing, damaged, or another setup's.
         """
-        pool = (
-            generator(identity.seed, "pool", 0).random((identity.pool, setup.dimensions)).astype(np.float32)
+        needs_model = methods.needs_model(identity.method)
+        optimization = Optimization(
+            setup,
+            identity.method,
+            identity.seed,
+            identity.pool,
+            _network(identity, model) if needs_model else None,
+            identity.draws,
         )
-        problem = Problem(setup.dimensions, setup.objective_limits, pool)
-        if methods.needs_model(identity.method):
-            network = _network(identity, model)
-            latents = Latents.of(torch.tensor(pool), network.latent_means)
-            densities, adjustable = Densities.of(network), Adjustable(network)
-            problem = replace(problem, latents=latents, densities=densities, adjustable=adjustable)
-        return cls(methods.build(identity.method, problem).suggest, problem.latents)
+        problem = optimization.problem()
+        return cls(optimization, methods.build(identity.method, problem), problem.latents)
 
-    def predicted_badness(self, x: Float[np.ndarray, " D"]) -> float | None:
+    def random(self, index: int) -> Float32[np.ndarray, " D"]:
+        """The random controller of one of the first trials, by its index."""
+        return self.optimization.initial(index)
+
+    def suggest(self, history: History, index: int) -> Float32[np.ndarray, " D"]:
+        """The next controller.
+
+        Args:
+            history: what was measured.
+            index: of the trial.
+
+        Returns:
+            A point of the unit cube, [D].
+        """
+        return self.method.suggest(history, self.optimization.rng(index))
+
+    def predict(self, x: Float[np.ndarray, " D"]) -> float | None:
         """Badness of x as the model expects it, in [0, 1]; None without a model."""
         if self.latents is None:
             return None
@@ -90,9 +115,4 @@ def _network(identity: CampaignIdentity, model: Path | None) -> SvaeDc:
         raise UserError(f"method {identity.method!r} needs a trained model, got none; give one with --model")
     if fingerprint(model) != identity.model:
         raise UserError(f"the model {model} is not the one this campaign was planned with; restore that file")
-    try:
-        network, metadata = checkpoint.load(model)
-        checkpoint.require(model, metadata, {"setup": identity.setup})
-    except ValueError as error:
-        raise UserError(str(error)) from error
-    return network.requires_grad_(requires_grad=False)
+    return trained_model(model, identity.setup).model

@@ -11,7 +11,7 @@ from cluster.inputs import dataset_location
 from workers.controllers.controller import unit_cube
 from workers.dataset.folder import Dataset, open_dataset
 from workers.physics import Physics
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import Episode, rollout
 from workers.setups import Setup
 
@@ -41,7 +41,7 @@ def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
 
 def first_physics(setup: Setup, seed: int) -> Physics:
     """The physics of episode 0 of a dataset with that seed."""
-    return setup.physics.draw(generator(seed, "physics", 0))
+    return setup.physics.draw(generator(seed, Stream.PHYSICS, 0))
 
 
 def _roll_out(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
@@ -52,7 +52,7 @@ def _roll_out(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
 def _random(wanted: str, seed: str, setup: Setup) -> np.ndarray:
     """The controller of episode 0 of a dataset with that seed."""
     number = _whole(wanted, seed, "SEED")
-    return generator(number, "controller", 0).random(setup.dimensions, dtype=np.float32)
+    return generator(number, Stream.CONTROLLER, 0).random(setup.dimensions, dtype=np.float32)
 
 
 def _whole(wanted: str, text: str, name: str) -> int:

@@ -1,15 +1,13 @@
 """The claims of the paper beside what was measured: a table to read, and the same as JSON."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from cluster.comparison.folder import writing
-from cluster.comparison.report import FIGURE, PAGE
-from cluster.files import replacing
+from cluster.comparison.folder import FIGURE, PAGE
+from cluster.files import write_json, write_text, writing
 from cluster.reproduction.experiment import Recipe
 from cluster.reproduction.plan import Reproduction
 from svaedc.analysis.evidence import Claim, Finding
@@ -106,11 +104,8 @@ def publish(reproduction: Reproduction, found: Table) -> tuple[Path, Path]:
     stem = reproduction.results / reproduction.recipe.figure
     text, data = stem.with_suffix(".md"), stem.with_suffix(".json")
     with writing(reproduction.results):
-        with replacing(text) as unfinished:
-            unfinished.write_text("\n".join(_page(reproduction, found)) + "\n", encoding="utf-8")
-        with replacing(data) as unfinished:
-            content = {**found.as_json(), **_settings(reproduction)}
-            unfinished.write_text(json.dumps(content, indent=2) + "\n")
+        write_text(text, "\n".join(_page(reproduction, found)) + "\n")
+        write_json(data, {**found.as_json(), **_settings(reproduction)})
     return text, data
 
 

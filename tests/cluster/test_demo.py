@@ -13,7 +13,7 @@ from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
 from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 
 ALONE = Session("127.0.0.1:1", is_local=True, cpus=1)
 
@@ -23,7 +23,7 @@ def summary(f_of: dict[str, list[float]]):
     rows = [
         Row(method, run, 0, f, success=False) for method, all_f in f_of.items() for run, f in enumerate(all_f)
     ]
-    return summarize(rows, Reporting(initial=0), generator(0, "bootstrap", 0))
+    return summarize(rows, Reporting(initial=0), generator(0, Stream.BOOTSTRAP, 0))
 
 
 def difference(ours: list[float], theirs: list[float]):

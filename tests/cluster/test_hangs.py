@@ -25,7 +25,7 @@ from pathlib import Path
 
 from workers.environments.point import Point
 from workers.setups.quadratic import quadratic_30d
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 
 HERE = Path(__file__).parent
 
@@ -45,7 +45,7 @@ def stopped():
 
 
 WAYS = {2: asleep, 6: in_c, 10: stopped, 14: in_c}
-BY_X = {float(generator(5, "controller", index).random(30, "float32")[0]): index for index in WAYS}
+BY_X = {float(generator(5, Stream.CONTROLLER, index).random(30, "float32")[0]): index for index in WAYS}
 
 
 class Sticky(Point):

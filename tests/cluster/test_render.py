@@ -140,9 +140,9 @@ def test_an_mp4_opens_again_with_every_picture_and_its_rate(stripes, tmp_path):
 
 def test_a_controller_given_in_three_ways_is_the_same(setup, tmp_path):
     from cluster.rendering.episodes import episode_to_draw
-    from workers.randomness import generator
+    from workers.randomness import Stream, generator
 
-    x = generator(7, "controller", 0).random(48, dtype=np.float32)
+    x = generator(7, Stream.CONTROLLER, 0).random(48, dtype=np.float32)
     np.save(tmp_path / "x.npy", x)
     listed = ",".join(str(number) for number in x)
     episodes = [

@@ -14,7 +14,7 @@ from workers.hardware import robots
 from workers.hardware.driver import Measurement, Motion, RobotDriver, RobotFault
 from workers.hardware.ledger import FILE, MotionLedger
 from workers.hardware.robots import Robot
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
 PAGE = Path(__file__).parents[2] / "docs" / "hardware.md"
@@ -57,7 +57,7 @@ def robot(request):
 
 @pytest.fixture(scope="module")
 def x(robot):
-    return generator(0, "controller", 0).random(setups.load(robot.setup).dimensions)
+    return generator(0, Stream.CONTROLLER, 0).random(setups.load(robot.setup).dimensions)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_the_robot_knows_what_became_of_a_trial_whatever_process_asks(robot, ran
 @pytest.mark.parametrize("robot", REHEARSALS, indirect=True, scope="module")
 def test_a_rehearsal_moves_as_the_setup_of_its_own_name(robot, x, ran):
     setup = setups.load(robot.name)
-    physics = setup.gap("wide").draw(generator(SEED, "hidden-physics", 0))
+    physics = setup.gap("wide").draw(generator(SEED, Stream.HIDDEN_PHYSICS, 0))
     with setup.open() as environment:
         episode = rollout(setup, environment, x.astype(np.float32), physics)
     measured = ran[1]

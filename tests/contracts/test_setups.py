@@ -18,7 +18,7 @@ from workers import setups
 from workers.environments.environment import Observed
 from workers.gymnasium_environment import SetupEnvironment
 from workers.physics import PhysicsRanges
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import Episode, random_episode, rollout
 from workers.tasks.stop import STOPPED, never
 
@@ -178,7 +178,7 @@ def test_every_physics_parameter_changes_the_trajectory(setup, whole, environmen
     nominal = _nominal(setup)
     run = partial(rollout, whole if whole.name in REVEALING else setup, environment)
     controllers = [
-        generator(0, "controller", index).random(setup.dimensions, dtype=np.float32)
+        generator(0, Stream.CONTROLLER, index).random(setup.dimensions, dtype=np.float32)
         for index in REVEALING.get(setup.name, (0,))
     ]
     unchanged = [run(x, nominal).xi for x in controllers]
@@ -268,7 +268,7 @@ def test_gymnasium_accepts_the_environment(setup):
 
 def test_gymnasium_steps_reproduce_a_rollout_bit_for_bit(setup):
     adapter = SetupEnvironment(setup)
-    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    x = generator(0, Stream.CONTROLLER, 1).random(setup.dimensions, dtype=np.float32)
     _, info = adapter.reset(seed=7)
     with setup.open() as environment:
         expected = rollout(setup, environment, x, info["physics"])

@@ -9,7 +9,7 @@ import pytest
 from workers import setups
 from workers.environments.tabletop import Tabletop
 from workers.gymnasium_environment import SetupEnvironment
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import rollout
 from workers.setups.franka import MODEL
 
@@ -36,7 +36,7 @@ def setup():
 def test_an_episode_that_explodes_ends_with_the_reward_that_a_rollout_has_for_f(setup):
     adapter = SetupEnvironment(setup)
     _, info = adapter.reset(seed=1)
-    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    x = generator(0, Stream.CONTROLLER, 1).random(setup.dimensions, dtype=np.float32)
     with setup.open() as environment:
         episode = rollout(setup, environment, x, info["physics"])
     assert episode.stop == "diverged"

@@ -12,7 +12,7 @@ from workers.hardware import robots
 from workers.hardware.driver import Measurement, RobotFault
 from workers.hardware.ledger import MotionLedger
 from workers.hardware.rehearsal import RehearsalRobot
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
 EVIDENCE = "ab" * 32
@@ -26,7 +26,7 @@ def franka():
 
 @pytest.fixture(scope="module")
 def x(franka):
-    return generator(0, "controller", 0).random(franka.dimensions)
+    return generator(0, Stream.CONTROLLER, 0).random(franka.dimensions)
 
 
 def test_an_unknown_robot_is_refused_with_the_nearest_name():
@@ -38,7 +38,7 @@ def test_an_unknown_robot_is_refused_with_the_nearest_name():
 
 def test_a_rehearsal_measures_the_setup_under_the_hidden_physics_of_its_seed(franka, x, tmp_path):
     measured = RehearsalRobot(FRANKA, franka, 5, 0.0, tmp_path).run("a", x)
-    physics = franka.gap("wide").draw(generator(5, "hidden-physics", 0))
+    physics = franka.gap("wide").draw(generator(5, Stream.HIDDEN_PHYSICS, 0))
     with franka.open() as environment:
         episode = rollout(franka, environment, x.astype(np.float32), physics)
     assert (measured.f, measured.y, measured.stop) == (episode.f, episode.y, episode.stop)

@@ -4,27 +4,27 @@ import numpy as np
 import pytest
 
 from workers.physics import PhysicsRanges, around
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 
 
 def test_the_same_names_give_the_same_numbers():
-    assert np.array_equal(generator(3, "pool", 5).random(8), generator(3, "pool", 5).random(8))
+    assert np.array_equal(generator(3, Stream.POOL, 5).random(8), generator(3, Stream.POOL, 5).random(8))
 
 
 @pytest.mark.parametrize("other", [(4, "pool", 5), (3, "physics", 5), (3, "pool", 6)])
 def test_other_names_give_other_numbers(other):
-    assert not np.isin(generator(*other).random(64), generator(3, "pool", 5).random(64)).any()
+    assert not np.isin(generator(*other).random(64), generator(3, Stream.POOL, 5).random(64)).any()
 
 
 def test_neighbouring_streams_are_uncorrelated():
-    rows = np.array([generator(0, "controller", index).random(2000) for index in range(20)])
+    rows = np.array([generator(0, Stream.CONTROLLER, index).random(2000) for index in range(20)])
     off_diagonal = np.corrcoef(rows)[~np.eye(20, dtype=bool)]
     assert np.abs(off_diagonal).max() < 0.1
 
 
 def test_the_numbers_themselves_are_pinned():
     """Every dataset and every run depends on them: a change here is a change of ROLLOUT VERSION."""
-    assert generator(0, "controller", 0).random(3, dtype=np.float32).tolist() == [
+    assert generator(0, Stream.CONTROLLER, 0).random(3, dtype=np.float32).tolist() == [
         0.026647090911865234,
         0.07681524753570557,
         0.090889573097229,
@@ -34,12 +34,12 @@ def test_the_numbers_themselves_are_pinned():
 @pytest.mark.parametrize(("seed", "index"), [(-1, 0), (0, -1)])
 def test_negative_seeds_and_indices_are_refused(seed, index):
     with pytest.raises(ValueError, match="at least 0"):
-        generator(seed, "controller", index)
+        generator(seed, Stream.CONTROLLER, index)
 
 
 def test_physics_stays_within_its_ranges_and_reaches_both_ends():
     ranges = around({"mass": 2.0, "friction": 0.3}, 0.05)
-    draws = [ranges.draw(generator(0, "physics", index)) for index in range(400)]
+    draws = [ranges.draw(generator(0, Stream.PHYSICS, index)) for index in range(400)]
     masses = [draw["mass"] for draw in draws]
     assert 1.9 <= min(masses) < 1.91
     assert 2.09 < max(masses) <= 2.1
@@ -49,7 +49,7 @@ def test_physics_does_not_depend_on_the_order_of_declaration():
     """A dataset's identity stores the ranges sorted by name, and must be able to draw them again."""
     one = PhysicsRanges({"mass": (1.0, 2.0), "friction": (0.1, 0.2)})
     other = PhysicsRanges({"friction": (0.1, 0.2), "mass": (1.0, 2.0)})
-    assert one.draw(generator(0, "physics", 3)) == other.draw(generator(0, "physics", 3))
+    assert one.draw(generator(0, Stream.PHYSICS, 3)) == other.draw(generator(0, Stream.PHYSICS, 3))
 
 
 def test_ranges_cannot_be_changed_afterwards():

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from workers import setups
 from workers.environments.environment import Observed
 from workers.gymnasium_environment import SetupEnvironment
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import random_episode, rollout
 from workers.tasks.stop import LOW, OFF_WALKWAY, OUTSIDE, TILTED, HandGuard, WalkGuard, never
 from workers.tasks.walk import Walk
@@ -117,7 +117,7 @@ def test_gymnasium_terminates_where_a_rollout_stops_with_the_same_objective(setu
     expected, _ = pairs[index]
     adapter = SetupEnvironment(setup)
     adapter.reset(seed=0)
-    x = generator(0, "controller", index).random(setup.dimensions, dtype=np.float32)
+    x = generator(0, Stream.CONTROLLER, index).random(setup.dimensions, dtype=np.float32)
     adapter._environment.reset(expected.physics)
     command = setup.controller.start(x, adapter._environment, setup.horizon)
     for step in range(setup.horizon):
@@ -172,7 +172,7 @@ def test_a_stopped_walk_is_worth_what_was_walked_up_to_there():
 
 def test_daisy_stops_where_its_unstopped_walk_first_leaves_the_walkway_or_falls():
     setup = setups.load("daisy-11d-rehearsal")
-    x = generator(0, "controller", 1).random(setup.dimensions, dtype=np.float32)
+    x = generator(0, Stream.CONTROLLER, 1).random(setup.dimensions, dtype=np.float32)
     physics = {name: (low + high) / 2 for name, (low, high) in setup.physics.intervals.items()}
     with setup.open() as environment:
         episode = rollout(setup, environment, x, physics)

@@ -13,7 +13,7 @@ from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
 from workers.physics import PhysicsRanges
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import DIVERGED, degrees
 from workers.tasks.stop import STOPPED
 
@@ -122,7 +122,7 @@ def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
         yield "y is not the mean of the bad steps"
     yield from _stop_problems(columns, identity)
     drawn = columns.episode // identity.repeats
-    controllers = (generator(identity.seed, "controller", int(index)) for index in drawn)
+    controllers = (generator(identity.seed, Stream.CONTROLLER, int(index)) for index in drawn)
     width = columns.x.shape[1]
     if not all(
         np.array_equal(x, rng.random(width, dtype=np.float32))
@@ -130,7 +130,7 @@ def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     ):
         yield f"its controllers are not those of seed {identity.seed}"
     ranges = PhysicsRanges(identity.physics)
-    draws = (ranges.draw(generator(identity.seed, "physics", int(index))) for index in columns.episode)
+    draws = (ranges.draw(generator(identity.seed, Stream.PHYSICS, int(index))) for index in columns.episode)
     if not all(
         draw == {name: values[row] for name, values in columns.physics.items()}
         for row, draw in enumerate(draws)

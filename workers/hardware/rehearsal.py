@@ -12,7 +12,7 @@ from workers.controllers.controller import unit_cube
 from workers.hardware import ledger
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 from workers.rollout import rollout
 from workers.setups import Setup
 
@@ -40,7 +40,7 @@ class RehearsalRobot:
         self.name = name
         self.setup = setup.name
         self._simulated = setup
-        self._physics = setup.gaps["wide"].draw(generator(seed, "hidden-physics", 0))
+        self._physics = setup.gaps["wide"].draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
         self._pace = pace
         self._ledger = MotionLedger(folder / ledger.FILE)
         self._stopped = threading.Event()

@@ -7,6 +7,7 @@ import hashlib
 import os
 import signal
 import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -22,6 +23,7 @@ from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.status import Phase
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
+from workers.randomness import Stream, generator
 
 DIMENSIONS = 5
 IDENTITY = CampaignIdentity("desk", "desk", "climb", 7, "", 10, 2, Approval.POLICY)
@@ -104,10 +106,26 @@ def opened(folder: Path) -> Journal:
     return Journal(folder / journal.FILE, now)
 
 
+@dataclass
+class DeskProposals:
+    """Controllers of the desk robot, from a seed and a method without a model."""
+
+    method: Callable[..., np.ndarray] = climb
+    seed: int = IDENTITY.seed
+
+    def random(self, index):
+        return generator(self.seed, Stream.INITIAL, index).random(DIMENSIONS)
+
+    def suggest(self, history, index):
+        return self.method(history, generator(self.seed, Stream.SUGGESTION, index))
+
+    def predict(self, x):
+        return None
+
+
 def campaign_on(opened_journal: Journal, robot: DeskRobot, suggest=climb) -> Campaign:
-    return Campaign(
-        opened_journal, robot, suggest, lambda _: None, DIMENSIONS, asdict(Process.current()), {"desk": "1"}
-    )
+    proposals = DeskProposals(suggest, opened_journal.identity.seed)
+    return Campaign(opened_journal, robot, proposals, DIMENSIONS, asdict(Process.current()), {"desk": "1"})
 
 
 def carry_out(

@@ -23,7 +23,7 @@ from tests.cluster.hardware.desk import (
     opened,
     starts,
 )
-from workers.randomness import generator
+from workers.randomness import Stream, generator
 
 
 @pytest.fixture
@@ -57,7 +57,9 @@ def test_every_trial_passes_every_state_in_order(tmp_path):
 
 def test_random_trials_come_from_their_own_stream_and_number(tmp_path):
     carry_out(tmp_path)
-    expected = [generator(IDENTITY.seed, "initial", n).random(DIMENSIONS).astype(np.float32) for n in (0, 1)]
+    expected = [
+        generator(IDENTITY.seed, Stream.INITIAL, n).random(DIMENSIONS).astype(np.float32) for n in (0, 1)
+    ]
     assert [t.x.astype(np.float32).tobytes() for t in whole(tmp_path)[0][:2]] == [
         x.tobytes() for x in expected
     ]
@@ -67,7 +69,9 @@ def test_a_suggestion_is_the_methods_answer_to_the_journal(tmp_path):
     carry_out(tmp_path)
     trials, _ = whole(tmp_path)
     past = campaign.history(trials[:3], DIMENSIONS)
-    assert trials[3].x.tobytes() == climb(past, generator(7, "suggestion", 3)).astype(np.float64).tobytes()
+    assert (
+        trials[3].x.tobytes() == climb(past, generator(7, Stream.SUGGESTION, 3)).astype(np.float64).tobytes()
+    )
 
 
 def test_the_evidence_of_a_measurement_is_kept(tmp_path):

@@ -173,7 +173,7 @@ def test_a_model_that_does_not_serve_the_robot_is_refused(tmp_path, model, conte
 def test_a_method_without_model_predicts_nothing():
     setup = setups.load("franka")
     proposals = Proposals.of(identify(ROBOT, "se", 1, 0, 9, None, Approval.POLICY), setup, None)
-    assert proposals.predicted_badness(np.full(setup.dimensions, 0.5)) is None
+    assert proposals.predict(np.full(setup.dimensions, 0.5)) is None
     assert fingerprint(None) == ""
 
 

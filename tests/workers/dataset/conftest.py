@@ -33,21 +33,23 @@ def identity():
 def episodes_of():
     """(identity, indices) -> the episodes with those indices, each a function of (seed, index) alone."""
     from workers.physics import PhysicsRanges
-    from workers.randomness import generator
+    from workers.randomness import Stream, generator
     from workers.rollout import Episode
 
     def episode(identity, index: int) -> Episode:
-        rng = generator(identity.seed, "toy", index)
+        rng = np.random.default_rng([identity.seed, index])
         diverged = index % 7 == 3
         bad = np.where(diverged, 3, rng.integers(0, 4, identity.horizon)).astype(np.uint8)
         return Episode(
-            x=generator(identity.seed, "controller", index // identity.repeats).random(2, dtype=np.float32),
+            x=generator(identity.seed, Stream.CONTROLLER, index // identity.repeats).random(
+                2, dtype=np.float32
+            ),
             xi=rng.uniform(-1, 1, (3, identity.horizon)).astype(np.float32),
             bad=bad,
             y=float((bad != 0).mean()),
             f=float(np.float32(rng.normal())),
             stop="diverged" if diverged else "",
-            physics=PhysicsRanges(identity.physics).draw(generator(identity.seed, "physics", index)),
+            physics=PhysicsRanges(identity.physics).draw(generator(identity.seed, Stream.PHYSICS, index)),
         )
 
     return lambda identity, indices: [episode(identity, index) for index in indices]

@@ -1,0 +1,87 @@
+"""What one run of Bayesian optimisation is made from; comparison, campaign and notebook all get it here."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+
+from svaedc.bo import methods
+from svaedc.bo.candidates import Problem
+from svaedc.bo.distribution_features import Densities
+from svaedc.bo.features import Latents
+from svaedc.bo.methods import Method
+from svaedc.bo.online import Adjustable
+from svaedc.model.svae_dc import SvaeDc
+from workers.randomness import Stream, generator
+from workers.setups import Setup
+
+DRAWS: Final = 2
+"""The version of how controllers are drawn: 1 drew in float64 and rounded, as campaigns of svaedc 0.1.0 did; 2 draws
+in float32, as comparisons always did. The two are different controllers of the same seed."""
+
+
+@dataclass(frozen=True)
+class Optimization:
+    """Everything that decides a run's controllers, but for what its trials measure.
+
+    Attributes:
+        setup: whose controllers are tried.
+        method: its name.
+        seed: of every draw, at least 0.
+        pool_size: controllers that a method with a pool may choose from.
+        model: in evaluation mode, its parameters frozen; None for methods that need none.
+        draws: version of how controllers are drawn.
+    """
+
+    setup: Setup
+    method: str
+    seed: int
+    pool_size: int
+    model: SvaeDc | None = None
+    draws: int = DRAWS
+
+    def initial(self, index: int) -> Float32[np.ndarray, " D"]:
+        """The random controller of one of the first trials, which all methods of a seed share.
+
+        Args:
+            index: of the trial, from 0.
+
+        Returns:
+            A point of the unit cube, [D].
+        """
+        return self._uniform(generator(self.seed, Stream.INITIAL, index), (self.setup.dimensions,))
+
+    def rng(self, index: int) -> np.random.Generator:
+        """What a method may draw from for the trial of that index."""
+        return generator(self.seed, Stream.SUGGESTION, index)
+
+    def problem(self) -> Problem:
+        """What methods are built for: the pool, and what the model says of it where the method needs one."""
+        shape = (self.pool_size, self.setup.dimensions)
+        pool = self._uniform(generator(self.seed, Stream.POOL, 0), shape)
+        if self.model is None or not methods.needs_model(self.method):
+            return Problem(self.setup.dimensions, self.setup.objective_limits, pool)
+        return Problem(
+            self.setup.dimensions,
+            self.setup.objective_limits,
+            pool,
+            Latents.of(torch.from_numpy(pool), self.model.latent_means),
+            Densities.of(self.model),
+            Adjustable(self.model),
+        )
+
+    def build(self) -> Method:
+        """The method, ready to suggest.
+
+        Raises:
+            LookupError: there is none of that name.
+            ValueError: it lacks its model, or its pool is empty.
+        """
+        return methods.build(self.method, self.problem())
+
+    def _uniform(self, rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+        if self.draws == 1:
+            return rng.random(shape).astype(np.float32)
+        return rng.random(shape, dtype=np.float32)
