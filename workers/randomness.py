@@ -6,12 +6,15 @@ import numpy as np
 
 
 def generator(seed: int, stream: str, index: int) -> np.random.Generator:
-    """A generator of its own for every (seed, stream, index).
+    """Make a generator of its own for every (seed, stream, index).
 
     Args:
         seed: of the dataset, comparison or campaign, at least 0.
         stream: what is drawn, such as "controller", "physics" or "pool".
         index: of the episode, run or trial, at least 0.
+
+    Returns:
+        The same numbers, in the same order, for the same three.
 
     Raises:
         ValueError: when seed or index is negative.

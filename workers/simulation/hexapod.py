@@ -89,7 +89,13 @@ class Hexapod:
         return [info[1].decode() for info in infos]
 
     def set_dynamics(self, *, friction: float, restitution: float, damping: float) -> None:
-        """Set the contact coefficients of every link, and the links' damping (linear and angular) in 1/s."""
+        """Set the contact coefficients and the damping of every link.
+
+        Args:
+            friction: coefficient of sliding.
+            restitution: share of the speed kept in a bounce.
+            damping: linear and angular, in 1/s.
+        """
         for link in (_BASE, *self._joints):
             pybullet.changeDynamics(
                 self.body,
