@@ -42,7 +42,15 @@ class SetupEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start an episode; `seed` decides its physics and that of the episodes after it."""
+        """Start an episode.
+
+        Args:
+            seed: decides its physics and that of the episodes after it; None goes on with the last one.
+            options: not looked at.
+
+        Returns:
+            The first observation, [obs], and `info` with `physics` and `bad`.
+        """
         super().reset(seed=seed, options=options)
         physics = self._setup.physics.draw(self.np_random)
         self._environment.reset(physics)

@@ -43,7 +43,15 @@ class PhysicsRanges:
 
 
 def around(nominal: Mapping[str, float], spread: float) -> PhysicsRanges:
-    """Every parameter within ±spread of its nominal value (0.05 is five per cent)."""
+    """Let every parameter vary about its nominal value.
+
+    Args:
+        nominal: value of every parameter, by name, at least 0.
+        spread: to either side, in parts of the value, in [0, 1] (0.05 is five per cent).
+
+    Returns:
+        An interval for every parameter.
+    """
     return PhysicsRanges({name: (v * (1 - spread), v * (1 + spread)) for name, v in nominal.items()})
 
 

@@ -36,7 +36,7 @@ _UNIT = np.eye(3)
 _SMALL = 1e-3  # length below which a column of a rotation matrix has no direction
 
 Pose = tuple[Float[np.ndarray, "3"], list[float]]
-"""Position in m, and orientation as a quaternion (x, y, z, w)."""
+"""It is a position in m, [3], and an orientation as a quaternion (x, y, z, w)."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,16 @@ class Size:
 def frames(
     setup: Setup, xi: Float32[np.ndarray, "obs time"], steps: Sequence[int], size: Size
 ) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
-    """The pictures of some steps of a trajectory.
+    """Draw some steps of a trajectory.
 
     Args:
         setup: what the trajectory is of.
-        xi: in the units of the setup's channels; rotations need not be exact.
+        xi: [obs, T], in the units of the setup's channels; rotations need not be exact.
         steps: indices into time, in any order.
         size: of every picture.
+
+    Yields:
+        One picture per step: red, green and blue, from the top left.
 
     Raises:
         ValueError: when ξ has other channels than the setup or is not finite.
@@ -109,7 +112,12 @@ class Show:
         return [stage.add_machine(model.urdf, model.joints)]
 
     def pose(self, column: Float32[np.ndarray, " obs"], target: Float[np.ndarray, "3"]) -> None:
-        """Put every body where one step of ξ says, seen from the target: shadows fall well only around 0."""
+        """Put every body where one step of ξ says, seen from the target: shadows fall well only around 0.
+
+        Args:
+            column: one step of ξ, [obs].
+            target: the point looked at, in m, [3], drawn at the origin.
+        """
         for model, bodies in zip(self._scenery.bodies, self.bodies, strict=True):
             if isinstance(model, Machine):
                 self._stage.bend(bodies[0], column[[self._rows[name] for name in model.joints]].tolist())
@@ -130,7 +138,15 @@ class Show:
     def targets(
         self, xi: Float32[np.ndarray, "obs time"], control_step: float
     ) -> Float[np.ndarray, "3 time"]:
-        """The point that the camera looks at in every step; one that follows does so calmly."""
+        """Choose the point that the camera looks at in every step; one that follows does so calmly.
+
+        Args:
+            xi: the trajectory, [obs, T].
+            control_step: s from one step to the next.
+
+        Returns:
+            The points, in m, [3, T].
+        """
         camera = self._scenery.camera
         targets = np.repeat(np.array(camera.target)[:, None], xi.shape[1], axis=1)
         if camera.follows:

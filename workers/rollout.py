@@ -25,12 +25,12 @@ from workers.tasks.stop import STOPPED, never
 from workers.tasks.task import Bad, check_bad, require_objective
 
 VERSION = 1
-"""Part of a dataset's identity: raise it whenever an episode's bytes change."""
+"""It is part of a dataset's identity: raise it whenever an episode's bytes change."""
 
 DIVERGED = "diverged"
 
 Stored = UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
-"""Per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad."""
+"""It holds per step one bit for each bad condition, or the degree in [0, 1] of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,15 @@ class Episode:
 def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Physics) -> Episode:
     """Run controller x for the setup's horizon under the given physics.
 
+    Args:
+        setup: robot, controller and task.
+        environment: the setup's, open.
+        x: the controller, [D], in [0, 1].
+        physics: a value for every parameter of the setup, by name.
+
+    Returns:
+        The record of T steps, however early it ended; f is not checked to be finite.
+
     Raises:
         ValueError: when x is not a vector of D numbers in [0, 1], physics names other parameters than the
             setup's, or the task gives bad steps that an episode cannot hold.
@@ -95,6 +104,9 @@ def random_episode(
         seed: of the dataset.
         index: of the episode.
         repeats: how many consecutive episodes share a controller; each has physics of its own.
+
+    Returns:
+        The episode, whose f is finite.
 
     Raises:
         ValueError: as `rollout` does, or the objective is not finite, which no dataset can hold; a trial of
@@ -171,7 +183,15 @@ def diverged_objective(setup: Setup) -> float:
 
 
 def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...]) -> int:
-    """How many steps pass before a channel leaves its bounds or is not a number: the simulation exploded."""
+    """Count the steps before a channel leaves its bounds or is not a number: the simulation exploded.
+
+    Args:
+        xi: the trajectory, [obs, T].
+        channels: of its rows, in order.
+
+    Returns:
+        From 0 to T, which means that it never did.
+    """
     slack = 1e-5  # float32 rotation matrices
     low = np.array([channel.low for channel in channels], dtype=np.float32)[:, None] - slack
     high = np.array([channel.high for channel in channels], dtype=np.float32)[:, None] + slack
@@ -187,7 +207,15 @@ def degrees(
 
 
 def stride_steps(horizon: int, stride: int) -> slice:
-    """The steps that a model sees of an episode: the last one of every whole stride."""
+    """Choose the steps that a model sees of an episode: the last one of every whole stride.
+
+    Args:
+        horizon: T, control steps.
+        stride: control steps per sample, at least 1.
+
+    Returns:
+        horizon // stride places on the axis of time.
+    """
     return slice(stride - 1, horizon // stride * stride, stride)
 
 

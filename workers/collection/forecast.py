@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 from workers.collection.shard import ShardReport
 
 LEVEL = 0.9
-"""Share of the intervals that are to hold the true number, if shards are alike."""
+"""This share of the intervals is to hold the true number, if shards are alike."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Forecast:
 
 
 def forecast(pilot: Sequence[ShardReport], episodes: int, actors: int) -> Forecast:
-    """What a job costs, of which some shards are done.
+    """Estimate what a job costs, of which some shards are done.
 
     The other shards cost the mean of those, in proportion to their episodes; the interval is Student's for
     the mean of m further shards, given n: t · s · √(1/n + 1/m).
@@ -77,6 +77,9 @@ def forecast(pilot: Sequence[ShardReport], episodes: int, actors: int) -> Foreca
         pilot: the shards that are done, at least two.
         episodes: of the whole job, with those of the pilot.
         actors: that roll out at the same time.
+
+    Returns:
+        Expected numbers of the whole job, each with its margin; the margins are 0 when nothing is left to do.
 
     Raises:
         ValueError: the pilot is too short to know a spread, or longer than the job.

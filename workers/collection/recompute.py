@@ -20,7 +20,16 @@ from workers.setups import Setup
 
 
 def draw_shards(dataset: Dataset, count: int, rng: np.random.Generator) -> list[Shard]:
-    """That many of the dataset's shards, all if there are fewer, in order."""
+    """Draw finished shards at random, none twice.
+
+    Args:
+        dataset: from which they are drawn.
+        count: how many.
+        rng: that draws.
+
+    Returns:
+        That many shards, all if there are fewer, in order.
+    """
     shards = dataset.shards()
     chosen = rng.choice(len(shards), size=min(count, len(shards)), replace=False)
     return [shards[int(place)] for place in np.sort(chosen)]
@@ -31,6 +40,14 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
 
     Bytes that differ are compared once more as numbers, because another processor may round otherwise, and
     another version of PyArrow may write the same episodes as other bytes.
+
+    Args:
+        setup: of the dataset.
+        dataset: to which the shard belongs.
+        shard: which episodes.
+
+    Returns:
+        No defect if the bytes are the same, otherwise one that says what differs.
     """
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
@@ -55,6 +72,14 @@ def find_broken(dataset: Dataset) -> Iterator[tuple[Shard, bool]]:
 
 def repair(setup: Setup, dataset: Dataset, shard: Shard) -> Repair:
     """Roll out a shard again and put it in its place; what was there is kept aside if it differs.
+
+    Args:
+        setup: of the dataset.
+        dataset: to which the shard belongs.
+        shard: which episodes.
+
+    Returns:
+        What became of the shard.
 
     Raises:
         OSError: the disk is full or not writable; the old file is where it was.

@@ -47,6 +47,10 @@ class ShardReport:
 def require_working(setup: Setup, seed: int) -> None:
     """Roll out one episode if users supplied the robot or G_bad: their mistakes are no fault of a shard.
 
+    Args:
+        setup: what is tried.
+        seed: of the dataset; its episode 0 is the one rolled out.
+
     Raises:
         ValueError: something in their code is not as it must be, such as the shape of what G_bad returns, or
             an objective that is no finite number.
@@ -58,7 +62,16 @@ def require_working(setup: Setup, seed: int) -> None:
 
 
 def roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
-    """The episodes of a shard, in a fresh simulation."""
+    """Roll out the episodes of a shard, in a fresh simulation.
+
+    Args:
+        setup: of the dataset.
+        dataset: whose seed and repeats hold.
+        shard: which episodes.
+
+    Returns:
+        The episodes, in the order of their indices.
+    """
     seed, repeats = dataset.identity.seed, dataset.identity.repeats
     with setup.open() as environment:
         return [
@@ -80,6 +93,9 @@ def collect_shard(
         dataset: to which the shard belongs.
         shard: which episodes.
         roll_out: makes them.
+
+    Returns:
+        What the shard was and cost.
 
     Raises:
         OSError: when the disk is full or not writable; nothing is left behind.
@@ -106,6 +122,10 @@ def collect_shard(
 
 def require_same_code(setup: Setup, dataset: Dataset) -> None:
     """Refuse to roll out where the episodes would differ from those that the dataset promises.
+
+    Args:
+        setup: as this machine has it.
+        dataset: whose identity it must have.
 
     Raises:
         ValueError: naming this machine, and what differs in its code or libraries.

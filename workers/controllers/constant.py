@@ -21,6 +21,15 @@ class Constant(Controller):
     parameters: tuple[Channel, ...]
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
-        """The same command in every step."""
+        """Command the same in every step.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            environment: not looked at.
+            horizon: not looked at.
+
+        Returns:
+            The physical values of x, whatever the step.
+        """
         command = self.values(x).tolist()
         return lambda _: command

@@ -10,7 +10,7 @@ from jaxtyping import Float32
 from workers.environments.environment import Channel
 
 Command = Callable[[int], Sequence[float]]
-"""From the index of a control step to the command applied in it."""
+"""It leads from the index of a control step to the command applied in it."""
 
 
 class Controller(ABC):
@@ -31,11 +31,27 @@ class Controller(ABC):
 
     @abstractmethod
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:
-        """Plan `horizon` steps of the controller x from the environment's present state."""
+        """Plan `horizon` steps of the controller x from the environment's present state.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            environment: the simulation that is controlled, open and reset.
+            horizon: T, control steps.
+
+        Returns:
+            The command of each step, from 0 to horizon − 1; it may read the environment as it is then.
+        """
 
 
 def unit_cube(x: Sequence[float] | np.ndarray, dimensions: int) -> Float32[np.ndarray, " d"]:
-    """The controller x as float32, refused unless it is a finite vector of D numbers in [0, 1].
+    """Refuse a controller unless it is a finite vector of D numbers in [0, 1].
+
+    Args:
+        x: the controller.
+        dimensions: D.
+
+    Returns:
+        A copy of x as float32, [D].
 
     Raises:
         ValueError: naming what is wrong with x.

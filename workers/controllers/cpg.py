@@ -20,7 +20,7 @@ from workers.controllers.controller import Command, Controller
 from workers.environments.environment import Channel
 
 LEGS = ("LF", "LM", "LB", "RB", "RM", "RF")
-"""Order of the oscillators, once around the body."""
+"""The oscillators stand in this order, once around the body."""
 KINDS = ("base", "shoulder", "elbow")
 COUPLING = 10.0  # w, 1/s
 TIME_STEP = 0.01  # s of the oscillators' time in each control step
@@ -48,10 +48,17 @@ class Gait:
 
 
 def phases(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
-    """θ after each of the Euler steps.
+    """Integrate the oscillators by Euler steps.
 
     In ψ = θ + shift no coupling has a bias, and the sum over all bases needs one sine and cosine of each:
     Σ_j sin(ψ_j − ψ_i) = cos ψ_i Σ_j sin ψ_j − sin ψ_i Σ_j cos ψ_j.
+
+    Args:
+        gait: numbers of the pattern generator.
+        steps: how many, each of `TIME_STEP`.
+
+    Returns:
+        θ after each step, in rad, [steps, 3, 6], rows and columns as in `Gait`; it is not wrapped.
     """
     psi = np.array(gait.shifts)
     free = TIME_STEP * 2 * pi * gait.frequency[:, None]
@@ -69,7 +76,15 @@ def phases(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
 
 
 def outputs(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
-    """R (1 + cos θ) − o of every oscillator after each step, in rad."""
+    """Integrate the oscillators for their outputs R (1 + cos θ) − o.
+
+    Args:
+        gait: numbers of the pattern generator.
+        steps: how many, each of `TIME_STEP`.
+
+    Returns:
+        Outputs after each step, in rad, [steps, 3, 6], rows and columns as in `Gait`.
+    """
     return gait.amplitude[:, None] * (1 + np.cos(phases(gait, steps))) - gait.offset[:, None]
 
 
@@ -100,7 +115,16 @@ class PatternGenerator(Controller):
         self._limits = np.array(limits)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
-        """Plan all commands at once: nothing that happens to the robot changes them."""
+        """Plan all commands at once: nothing that happens to the robot changes them.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            environment: not looked at.
+            horizon: T, control steps.
+
+        Returns:
+            18 joint angles in rad for each step.
+        """
         rows = self.commands(x, horizon)
 
         def command(step: int) -> list[float]:
@@ -109,7 +133,15 @@ class PatternGenerator(Controller):
         return command
 
     def commands(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "horizon 18"]:
-        """Joint angles in rad: legs LF RF LM RM LB RB, each with base, shoulder, elbow."""
+        """Plan the joint angles of all steps.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            horizon: T, control steps.
+
+        Returns:
+            Angles in rad, [horizon, 18]: legs LF RF LM RM LB RB, each with base, shoulder, elbow.
+        """
         left = self._directions * outputs(self._gait(self.values(x)), horizon)
         left[:, 2] += ELBOW_CENTER
         angles = (left[:, :, _COMMAND_LEGS] * _SIDES).transpose(0, 2, 1)

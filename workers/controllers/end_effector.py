@@ -71,7 +71,16 @@ class EndEffectorWaypoints(Controller):
         self._limits = torque_limits
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Tabletop, horizon: int) -> Command:
-        """Plan from the hand's present pose; the command of a step reads the arm's state at that step."""
+        """Plan from the hand's present pose; the command of a step reads the arm's state at that step.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            environment: the scene whose arm is moved.
+            horizon: T, control steps.
+
+        Returns:
+            Joint torques in N·m for each step.
+        """
         points = self.values(x).reshape(self._waypoints, 8)
         arm = environment.arm
         corners = np.vstack([arm.state.position, points[:, :3]])

@@ -12,7 +12,8 @@ from workers.environments.environment import Channel
 from workers.environments.tabletop import Tabletop
 
 SHARE = (0.1, 1.0)
-"""Range of a waypoint's duration, in shares of their sum; not from 0, for a speed cannot change at once."""
+"""The durations of waypoints lie in this range before they are divided by their sum. It does not begin at 0,
+for a speed cannot change at once."""
 
 
 class JointSpeedWaypoints(Controller):
@@ -47,7 +48,16 @@ class JointSpeedWaypoints(Controller):
         self.parameters = tuple(chain.from_iterable(_channels(n, speeds) for n in range(1, waypoints + 1)))
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Tabletop, horizon: int) -> Command:
-        """Plan all speeds; the command of a step reads the joints at that step."""
+        """Plan all speeds; the command of a step reads the joints at that step.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            environment: the scene whose arm is moved.
+            horizon: T, control steps.
+
+        Returns:
+            Joint speeds in rad/s for each step.
+        """
         plan = self.plan(x, horizon)
         arm = environment.arm
         lower, upper = self._lower, self._upper
@@ -58,7 +68,15 @@ class JointSpeedWaypoints(Controller):
         return command
 
     def plan(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "time joints"]:
-        """Speeds, in rad/s, wanted at the end of every step."""
+        """Plan the joint speeds of all steps, whatever the joints' angles.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            horizon: T, control steps.
+
+        Returns:
+            Speeds wanted at the end of every step, in rad/s, [horizon, joints].
+        """
         points = self.values(x).reshape(self._waypoints, -1)
         speeds = np.vstack([np.zeros(len(self._limits)), points[:, :-1]])
         ends = horizon * np.cumsum(points[:, -1]) / points[:, -1].sum()

@@ -5,7 +5,15 @@ from jaxtyping import Float
 
 
 def ends(horizon: int, waypoints: int) -> np.ndarray:
-    """Step at which each waypoint is reached, beginning with 0."""
+    """Give every waypoint an equal share of the steps.
+
+    Args:
+        horizon: T, control steps.
+        waypoints: how many are passed.
+
+    Returns:
+        Step at which each waypoint is reached, [waypoints + 1], beginning with 0.
+    """
     return np.linspace(0, horizon, waypoints + 1).round().astype(int)
 
 
@@ -13,6 +21,12 @@ def reference(
     corners: Float[np.ndarray, "points 3"], turns: Float[np.ndarray, "points 3"], horizon: int, dt: float
 ) -> tuple[np.ndarray, ...]:
     """Motion through the corners, each after an equal share of the horizon, from rest to rest.
+
+    Args:
+        corners: positions in m, [points, 3], the first of them the start.
+        turns: roll, pitch, yaw in rad at each corner, [points, 3].
+        horizon: T, control steps.
+        dt: s of a control step.
 
     Returns:
         Position, velocity, acceleration [horizon, 3], orientation as quaternions (x, y, z, w) [horizon, 4],
@@ -37,9 +51,18 @@ def minimum_jerk(
     b: Float[np.ndarray, "#time d"],
     duration: Float[np.ndarray, "#time 1"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, velocity, acceleration of the minimum-jerk motion a → b at the fractions s of its duration.
+    """Evaluate the minimum-jerk motion a → b at the fractions s of its duration.
 
     Fifth-order polynomial with zero velocity and acceleration at both ends: 10 s³ − 15 s⁴ + 6 s⁵.
+
+    Args:
+        s: fractions in [0, 1], [T, 1].
+        a: where it begins, [T, d] or [1, d].
+        b: where it ends, [T, d] or [1, d].
+        duration: of the whole motion, [T, 1] or [1, 1], in any unit of time.
+
+    Returns:
+        Position, velocity and acceleration, [T, d] each, in the units of a, b and duration.
     """
     position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
     velocity = (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
@@ -74,7 +97,15 @@ def euler_angles(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
 
 
 def angular_velocity(quaternion: Float[np.ndarray, "time 4"], dt: float) -> Float[np.ndarray, "time 3"]:
-    """Angular velocity, in the world, of a sequence of orientations: 2 q̇ q*."""
+    """Differentiate a sequence of orientations: 2 q̇ q*.
+
+    Args:
+        quaternion: orientations (x, y, z, w), [T, 4], without a jump from q to −q.
+        dt: s from one to the next.
+
+    Returns:
+        Angular velocity in the world, in rad/s, [T, 3].
+    """
     change = np.gradient(quaternion, dt, axis=0)
     (x, y, z, w), (dx, dy, dz, dw) = quaternion.T, change.T
     return 2 * np.stack(

@@ -68,6 +68,14 @@ def training_cache(dataset: Dataset, stride: int, parent: Path) -> TrainingCache
     The folder is looked at once: what is decoded are the shards of the fingerprint that the cache is named
     after, whatever arrives meanwhile.
 
+    Args:
+        dataset: what is trained on.
+        stride: control steps per sample, 1 to the horizon.
+        parent: folder of all caches, made when it is missing.
+
+    Returns:
+        The cache, whose arrays can only be read.
+
     Raises:
         ValueError: when the stride does not fit the horizon, the dataset is empty, damaged, or holds files of
             another, episodes twice or numbers that are not finite, or the cache is damaged.
@@ -117,6 +125,11 @@ def _sweep(parent: Path) -> None:
 
 def require_space(needed: int, free: int, folder: Path) -> None:
     """Refuse to begin a cache that will not fit.
+
+    Args:
+        needed: bytes of the cache.
+        free: bytes left on the disk.
+        folder: below which it is to lie, for the error.
 
     Raises:
         OSError: when more bytes are needed than are free; it names both, and the ways out.

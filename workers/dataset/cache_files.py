@@ -12,13 +12,21 @@ READY = "cache.json"
 """Its presence says that the arrays beside it are complete."""
 
 Layout = Mapping[str, tuple[type[np.generic], tuple[int, ...]]]
-"""Type and shape of every array, by its name."""
+"""It tells the type and shape of every array, by its name."""
 
 _BLOCK = 1 << 20
 
 
 def make(folder: Path, layout: Layout) -> dict[str, np.memmap]:
-    """New memory-mapped arrays, to be filled and flushed."""
+    """Make new memory-mapped arrays, to be filled and flushed.
+
+    Args:
+        folder: where their files go; it must exist.
+        layout: of the arrays.
+
+    Returns:
+        The arrays by name, all zeros.
+    """
     return {
         name: np.lib.format.open_memmap(_path(folder, name), mode="w+", dtype=kind, shape=shape)
         for name, (kind, shape) in layout.items()
@@ -26,7 +34,13 @@ def make(folder: Path, layout: Layout) -> dict[str, np.memmap]:
 
 
 def finish(folder: Path, layout: Layout, facts: Mapping[str, int]) -> None:
-    """Say that the arrays are complete: write `facts`, the number of episodes among them, and checksums."""
+    """Say that the arrays are complete, in a file with their checksums.
+
+    Args:
+        folder: of the arrays.
+        layout: of the arrays.
+        facts: what the file also says, `episodes` for their number among it.
+    """
     checksums = {name: _checksum(_path(folder, name)) for name in layout}
     (folder / READY).write_text(json.dumps({**facts, "crc32": checksums}) + "\n")
 
@@ -37,7 +51,7 @@ def is_finished(folder: Path) -> bool:
 
 
 def open_arrays(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, np.ndarray]:
-    """The arrays, memory-mapped to be read, once they are found to be those that were made.
+    """Map the arrays into memory, to be read, once they are found to be those that were made.
 
     Every byte is checked against its file's CRC-32; of a cache from before there were checksums, types and
     shapes alone.
@@ -45,6 +59,9 @@ def open_arrays(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, n
     Args:
         folder: of a finished cache.
         layout_of: from the number of episodes to the layout.
+
+    Returns:
+        The arrays by name.
 
     Raises:
         ValueError: an array is damaged or missing; the message says what to delete.

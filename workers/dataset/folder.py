@@ -122,6 +122,13 @@ class Dataset:
 def create(folder: Location, identity: Identity) -> Dataset:
     """Open the dataset in a folder, or begin it there.
 
+    Args:
+        folder: of the dataset, made when it is missing.
+        identity: what is asked for.
+
+    Returns:
+        The open dataset.
+
     Raises:
         ValueError: when the folder holds a dataset of another identity, naming the fields that differ.
     """

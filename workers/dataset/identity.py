@@ -112,7 +112,18 @@ class Identity:
 def identity_of(
     setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1, storage: str = "float32"
 ) -> Identity:
-    """The identity of a dataset collected now, with this code and these libraries."""
+    """Identify a dataset that is collected now, with this code and these libraries.
+
+    Args:
+        setup: what is rolled out.
+        seed: of all controllers and physics.
+        episodes_per_shard: of a whole file, at least 1.
+        repeats: episodes of each controller, at least 1.
+        storage: of ξ, one of `STORAGES`.
+
+    Returns:
+        The identity.
+    """
     return Identity(
         setup=setup.name,
         parameters=tuple((p.name, p.low, p.high) for p in setup.controller.parameters),

@@ -18,7 +18,15 @@ def manifest_text(identity: Identity) -> str:
 
 
 def ensure_manifest(folder: Location, text: str) -> bytes:
-    """Write the manifest unless there is one; returns the one that counts, of two writers the first's."""
+    """Write the manifest unless there is one.
+
+    Args:
+        folder: of the dataset; it must exist.
+        text: of the manifest, as from `manifest_text`.
+
+    Returns:
+        The bytes of the one that counts, of two writers the first's.
+    """
     manifest = folder / MANIFEST
     if manifest.exists():
         return manifest.read_bytes()

@@ -7,11 +7,18 @@ from workers.dataset.storage.location import Location
 
 IDENTITY_TEXT = "svaedc.identity"
 IDENTITY_DIGEST = "svaedc.digest"
-"""Names in the metadata of a file."""
+"""A file's metadata hold the identity of its dataset under the first name, its digest under the second."""
 
 
 def identity_in(path: Location, metadata: Mapping[bytes, bytes]) -> Identity:
-    """The identity that the metadata of a file hold.
+    """Find the identity in the metadata of a file.
+
+    Args:
+        path: of the file, for the error.
+        metadata: of the file.
+
+    Returns:
+        The identity of the file's dataset.
 
     Raises:
         ValueError: they hold none.
@@ -23,6 +30,11 @@ def identity_in(path: Location, metadata: Mapping[bytes, bytes]) -> Identity:
 
 def require_own(path: Location, metadata: Mapping[bytes, bytes], identity: Identity) -> None:
     """Refuse a file that was copied from another dataset: its columns may be the same, its episodes are not.
+
+    Args:
+        path: of the file, for the error.
+        metadata: of the file.
+        identity: of the dataset in whose folder it lies.
 
     Raises:
         ValueError: naming what differs.

@@ -14,7 +14,14 @@ Stored = Float32[np.ndarray, "*n obs time"] | Int16[np.ndarray, "*n obs time"]
 
 
 def encode(xi: Float32[np.ndarray, "*n obs time"], identity: Identity) -> Stored:
-    """Trajectories as the identity stores them: unchanged, or the nearest of 2^16 values of each channel.
+    """Encode trajectories as the identity stores them.
+
+    Args:
+        xi: in the units of its channels, [..., obs, T].
+        identity: of the dataset.
+
+    Returns:
+        Unchanged numbers, or int16 codes for the nearest of 2^16 values of each channel, [..., obs, T].
 
     Raises:
         ValueError: a value to be coded is not finite.
@@ -29,7 +36,15 @@ def encode(xi: Float32[np.ndarray, "*n obs time"], identity: Identity) -> Stored
 
 
 def decode(values: Stored, identity: Identity) -> Float32[np.ndarray, "*n obs time"]:
-    """Trajectories from what is stored: low + (code + 32768) · (high − low) / 65535."""
+    """Restore trajectories from what is stored: low + (code + 32768) · (high − low) / 65535.
+
+    Args:
+        values: as from `encode`, [..., obs, T].
+        identity: of the dataset.
+
+    Returns:
+        Trajectories in the units of their channels, [..., obs, T].
+    """
     if identity.storage == "float32":
         return values
     low, high = _bounds(identity)

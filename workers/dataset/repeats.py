@@ -10,7 +10,7 @@ from workers.dataset.folder import Dataset
 from workers.rollout import DIVERGED
 
 TRAJECTORIES = 1_000
-"""At most so many episodes are read for the share of ξ."""
+"""At most so many episodes are used for the share of ξ."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from workers.dataset.storage.atomic import link, move, synchronise, temporary_fi
 from workers.dataset.storage.location import Location
 
 REPLACED = ".replaced"
-"""Folder, below the dataset, of what stood in a shard's place; readers of Parquet folders skip its name."""
+"""This folder, below the dataset, holds what stood in a shard's place; readers of Parquet skip its name."""
 
 
 class Repair(Enum):
@@ -29,6 +29,9 @@ def replace(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Re
         folder: of the dataset.
         shard: what is written.
         write: writes the file at the path it is given.
+
+    Returns:
+        What became of the shard.
 
     Raises:
         OSError: the disk is full or not writable; the old file is where it was.
@@ -54,6 +57,13 @@ def keep_aside(folder: Location, path: Location) -> Location:
     """Give a file a second name in `.replaced`, with the start of its SHA-256; equal bytes are kept once.
 
     One that the disk no longer reads has no SHA-256, and is called unreadable.
+
+    Args:
+        folder: of the dataset.
+        path: of the file.
+
+    Returns:
+        The second name.
     """
     aside = folder / REPLACED
     aside.mkdir(exist_ok=True)

@@ -27,7 +27,7 @@ _BITS = "one bit per condition, the first condition lowest"
 _GRADED = "degree of badness of each step, in [0, 1]"
 
 Bad = UInt8[np.ndarray, "n time"] | Float32[np.ndarray, "n time"]
-"""Bits of the bad conditions per step, or degrees of a graded G_bad."""
+"""It holds bits of the bad conditions per step, or degrees of a graded G_bad."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,14 @@ def schema(identity: Identity) -> pa.Schema:
 
 
 def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode]) -> None:
-    """Write consecutive episodes, the first with index `start`, compressed by zstd."""
+    """Write consecutive episodes, compressed by zstd.
+
+    Args:
+        path: of the new file.
+        identity: of the dataset.
+        start: index of the first episode.
+        episodes: at least one.
+    """
     layout = schema(identity)
     kinds = {field.name: field.type for field in layout}
     arrays = {
@@ -184,7 +191,14 @@ def read_identity(path: Location) -> Identity:
 
 
 def read(path: Location, identity: Identity) -> Columns:
-    """The episodes of a file, every page checked against its checksum.
+    """Read the episodes of a file, every page checked against its checksum.
+
+    Args:
+        path: of the file.
+        identity: of the dataset that it must belong to.
+
+    Returns:
+        All columns, ξ decoded.
 
     Raises:
         ValueError: when the file is damaged, of another dataset, or not of this schema.
@@ -204,7 +218,14 @@ def read(path: Location, identity: Identity) -> Columns:
 
 
 def read_outcomes(path: Location, identity: Identity) -> Outcomes:
-    """How the episodes of a file went; the large columns are not read.
+    """Read how the episodes of a file went, and none of the large columns.
+
+    Args:
+        path: of the file.
+        identity: of the dataset that it must belong to.
+
+    Returns:
+        The outcomes, in the order of the file.
 
     Raises:
         ValueError: when a part that is read is damaged, or the file is of another dataset or schema.
@@ -230,7 +251,15 @@ def _table(path: Location, identity: Identity, names: list[str]) -> pa.Table:
 
 
 def read_stops(path: Location, identity: Identity) -> tuple[str, ...]:
-    """The stop reasons of a file's episodes, without reading the rest; raises as `read_outcomes` does."""
+    """Read the stop reasons of a file's episodes alone; raises as `read_outcomes` does.
+
+    Args:
+        path: of the file.
+        identity: of the dataset that it must belong to.
+
+    Returns:
+        One reason per episode, in the order of the file; "" for none.
+    """
     return tuple(_table(path, identity, ["stop"])["stop"].to_pylist())
 
 

@@ -17,7 +17,7 @@ _BLOCK = 1 << 20
 _READERS = 8
 
 UNREADABLE = "unreadable"
-"""In the place of a digest."""
+"""It stands in the place of a digest where the disk does not give the bytes."""
 
 
 @dataclass(frozen=True, order=True)
@@ -56,7 +56,16 @@ def shard_named(name: str) -> Iterator[Shard]:
 
 
 def missing(shards: Iterable[Shard], episodes: int, per_shard: int) -> Iterator[Shard]:
-    """The shards still to be written for `episodes` episodes; a further file completes a partial one."""
+    """List the shards still to be written; a further file completes a partial one.
+
+    Args:
+        shards: that are there, in any order.
+        episodes: how many there shall be, from index 0 on.
+        per_shard: episodes of a whole shard.
+
+    Yields:
+        Each missing range, in order; none goes past a multiple of per_shard.
+    """
     done = sorted(shards)
     covered = 0
     position = 0
@@ -82,6 +91,9 @@ def commit(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Loc
         folder: of the dataset.
         shard: what is written.
         write: writes the file at the path it is given.
+
+    Returns:
+        Where the shard lies.
     """
     with temporary_file(folder, shard.name) as temporary:
         write(temporary)
@@ -92,17 +104,41 @@ def commit(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Loc
 
 
 def digest_path(folder: Location, shard: Shard) -> Location:
-    """Where the SHA-256 of a shard is kept, in the format of `sha256sum`."""
+    """Name the file with the SHA-256 of a shard, in the format of `sha256sum`.
+
+    Args:
+        folder: of the dataset.
+        shard: whose digest it is.
+
+    Returns:
+        The path, whether or not there is such a file.
+    """
     return folder / f"{shard.name}.sha256"
 
 
 def digest_line(shard: Shard, digest: str) -> str:
-    """The content of that file."""
+    """Word the content of the file at `digest_path`.
+
+    Args:
+        shard: whose digest it is.
+        digest: SHA-256 in hexadecimal.
+
+    Returns:
+        One line, as `sha256sum` writes it.
+    """
     return f"{digest}  {shard.name}\n"
 
 
 def recorded_digest(folder: Location, shard: Shard) -> str:
-    """The SHA-256 written beside a shard; "" when there is none."""
+    """Read the SHA-256 written beside a shard.
+
+    Args:
+        folder: of the dataset.
+        shard: whose digest it is.
+
+    Returns:
+        The first word of the file; "" when there is none.
+    """
     try:
         words = digest_path(folder, shard).read_text(errors="replace").split()
     except FileNotFoundError:
@@ -111,7 +147,15 @@ def recorded_digest(folder: Location, shard: Shard) -> str:
 
 
 def recorded_digests(folder: Location, shards: Iterable[Shard]) -> Iterator[str]:
-    """The same for many, asked for several at a time: an object store takes its time for each."""
+    """Read the SHA-256 beside many shards, several at a time: an object store takes its time for each.
+
+    Args:
+        folder: of the dataset.
+        shards: whose digests they are.
+
+    Yields:
+        One digest per shard, in their order; "" where there is none.
+    """
     with ThreadPoolExecutor(_READERS) as readers:
         yield from readers.map(lambda shard: recorded_digest(folder, shard), shards)
 

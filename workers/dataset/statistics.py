@@ -12,7 +12,7 @@ from workers.dataset.schema import Bad
 from workers.rollout import DIVERGED
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""The quantiles that describe the objective."""
+"""These quantiles describe the objective."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,15 @@ def statistics(dataset: Dataset) -> Statistics:
 
 
 def bad_steps(bad: Bad, conditions: int) -> Float64[np.ndarray, "n conditions"]:
-    """Bad steps of every condition in each episode; of a graded G_bad, the sum of its degrees."""
+    """Count the bad steps of every condition in each episode; of a graded G_bad, add up its degrees.
+
+    Args:
+        bad: bits of the conditions or degrees, [n, T].
+        conditions: how many there are; degrees always have one.
+
+    Returns:
+        Steps, [n, conditions], from 0 to T.
+    """
     if bad.dtype == np.float32:
         return bad.sum(axis=1, keepdims=True, dtype=np.float64)
     return (bad[..., None] >> np.arange(conditions, dtype=np.uint8) & 1).sum(axis=1, dtype=np.float64)

@@ -49,7 +49,15 @@ def overlaps(dataset: Dataset) -> list[Defect]:
 
 
 def file_problems(dataset: Dataset, shard: Shard) -> list[Defect]:
-    """What is wrong with a shard in itself, whatever lies beside it."""
+    """Find what is wrong with a shard in itself, whatever lies beside it.
+
+    Args:
+        dataset: to which it belongs.
+        shard: what is checked.
+
+    Returns:
+        One defect per problem; none if it is whole.
+    """
     path = fetch(dataset.path(shard))
     found = chain(_byte_problems(dataset, shard, path), _row_problems(dataset, shard, path))
     return [Defect(shard.name, what) for what in found]

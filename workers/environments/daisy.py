@@ -81,7 +81,7 @@ def observation() -> tuple[Channel, ...]:
 _FAR = 1e3  # m, rad and rad/s
 
 Record = bytes
-"""Doubles: joint angles, joint speeds, position of the centre of mass, quaternion, elbow contact (0 or 1)."""
+"""It packs doubles: joint angles, joint speeds, centre of mass, quaternion, elbow contact (0 or 1)."""
 
 _LAYOUT = Struct(f"{2 * len(JOINTS) + 8}d")
 

@@ -21,7 +21,7 @@ LEGS = {
     "LB": (LEFT, 240.0, 0.2375),
     "RB": (RIGHT, -60.0, 0.2375),
 }
-"""Side, direction in degrees from +x, and radius in m of each leg's mount, in the order of the joints."""
+"""Each leg's mount has a side, a direction in degrees from +x, and a radius in m; joints keep the order."""
 KINDS = ("base", "shoulder", "elbow")
 JOINTS = tuple(f"{leg}_{kind}" for leg in LEGS for kind in KINDS)
 SIDES = tuple(side for side, _, _ in LEGS.values() for _ in KINDS)
@@ -42,7 +42,7 @@ FOOT_MASS, FOOT_RADIUS = 0.060, 0.025  # radius assumed: tube and rubber
 HOUSING_RADIUS = 0.04  # m, of the sphere that stands for an actuator's body, assumed
 OUTPUT_HEIGHT = 0.045  # m, of an X8 above its mount
 PLATE, ACTUATOR, TUBE, RUBBER = "0.30 0.32 0.36", "0.80 0.16 0.14", "0.88 0.88 0.86", "0.12 0.12 0.13"
-"""Red, green and blue of the parts, in pictures."""
+"""In pictures the parts have these colours: red, green and blue, from 0 to 1."""
 FRONT_MARK = "0.12 0.04 0.004"  # m, of a plate on the chassis that is only seen
 
 

@@ -112,10 +112,11 @@ def _object_channels(name: str) -> list[Channel]:
 _FAR = 1e3  # m, rad and rad/s
 
 Record = bytes
-"""Doubles: joint angles, each object's position and quaternion, the hand's position, table contact (0 or 1).
+"""It packs doubles: joint angles, each object's position and quaternion, the hand's position, table contact
+(0 or 1).
 
-Bytes, because thousands of float objects kept alive would push the simulator's data out of the caches: with
-tuples an episode took a tenth longer.
+It is bytes because thousands of float objects kept alive would push the simulator's data out of the caches:
+with tuples an episode took a tenth longer.
 """
 
 

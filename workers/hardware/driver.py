@@ -74,7 +74,10 @@ class RobotDriver(Protocol):
 
         Args:
             trial_id: never seen by this robot before; a known one is refused before anything moves.
-            x: the controller, in the unit cube.
+            x: the controller, [D], in [0, 1].
+
+        Returns:
+            What the trial measured.
 
         Raises:
             RobotFault: when the robot broke off, stands still and measured nothing.

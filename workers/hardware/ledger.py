@@ -13,7 +13,7 @@ from jaxtyping import Float
 from workers.hardware.driver import Measurement, Motion
 
 FILE = "starts.jsonl"
-"""In the folder of a campaign, whatever the robot."""
+"""The ledger has this name in the folder of a campaign, whatever the robot."""
 
 STARTED = "started"
 ENDED = "ended"
@@ -32,6 +32,10 @@ class MotionLedger:
     def start(self, trial_id: str, x: Float[np.ndarray, " D"]) -> None:
         """Records that a trial is about to move the robot.
 
+        Args:
+            trial_id: of the trial.
+            x: its controller, [D]; the SHA-256 of its float64 is kept.
+
         Raises:
             RuntimeError: when the ledger already knows the trial: no trial moves a robot twice.
         """
@@ -44,7 +48,12 @@ class MotionLedger:
         self._append({"event": STARTED, "trial": trial_id, "x": digest, "pid": os.getpid()})
 
     def end(self, trial_id: str, measurement: Measurement) -> None:
-        """Records that a trial came to its end, and what it measured."""
+        """Records that a trial came to its end.
+
+        Args:
+            trial_id: of the trial.
+            measurement: what it measured.
+        """
         self._append({"event": ENDED, "trial": trial_id, "measurement": asdict(measurement)})
 
     def motion(self, trial_id: str) -> Motion:

@@ -17,7 +17,7 @@ from workers.rollout import rollout
 from workers.setups import Setup
 
 LONGEST_PACE_SECONDS = 86_400.0
-"""A day; a clock cannot wait for just any number."""
+"""The pace is at most a day, for a clock cannot wait for just any number."""
 
 
 class RehearsalRobot:
@@ -46,7 +46,18 @@ class RehearsalRobot:
         self._stopped = threading.Event()
 
     def run(self, trial_id: str, x: Float[np.ndarray, " D"]) -> Measurement:
-        """Rolls x out once under the hidden physics; see `RobotDriver.run`."""
+        """Rolls x out once under the hidden physics; see `RobotDriver.run`.
+
+        Args:
+            trial_id: never seen by this robot before.
+            x: the controller, [D], in [0, 1].
+
+        Returns:
+            What the episode was worth, and how long it took with the pace.
+
+        Raises:
+            RobotFault: it was stopped, before the trial or during it.
+        """
         began = time.monotonic()
         if self._stopped.is_set():
             raise RobotFault(f"trial {trial_id} was not started: the robot has been stopped")

@@ -10,7 +10,7 @@ from workers.hardware.driver import RobotDriver
 from workers.hardware.rehearsal import RehearsalRobot
 
 STAND_IN = "simulated stand-in"
-"""Stands wherever the result of one does, so that nobody takes it for a robot's."""
+"""These words stand wherever the result of one does, so that nobody takes it for a robot's."""
 
 
 @dataclass(frozen=True)

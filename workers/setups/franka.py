@@ -57,8 +57,8 @@ WAYPOINTS = WaypointRanges(
 
 
 SPEED_LIMIT = 2.175
-"""What joints 1 to 4 of the real arm reach, in rad/s; the others may reach 2.61, but Bullet has one limit for
-all."""
+"""Joints 1 to 4 of the real arm reach this speed, in rad/s; the others may reach 2.61, but Bullet has one
+limit for all."""
 
 
 def franka() -> Setup:

@@ -22,8 +22,8 @@ SETUPS = {
     "yumi": "workers.setups.yumi:yumi",
     "yumi-rehearsal": "workers.setups.yumi:yumi_rehearsal",
 }
-"""The setups that ship: the module and the function that makes each. A new robot is one module, and one line
-here for each of its variants; none for a module of the user's own, which offers `setup()`."""
+"""These setups ship; each name leads to the module and the function that makes it. A new robot is one module,
+and one line here for each of its variants. A module of the user's own needs no line, and offers `setup()`."""
 
 
 def load(name: str) -> Setup:

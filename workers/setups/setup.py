@@ -105,7 +105,19 @@ class Setup:
 
 
 def require_known(name: str, kind: str, names: Mapping[str, object]) -> str:
-    """The name itself if it is one of the names; otherwise a `LookupError` that suggests the nearest."""
+    """Refuse a name that is not one of the names.
+
+    Args:
+        name: what was asked for.
+        kind: of thing that it names, for the error.
+        names: that are known, as keys.
+
+    Returns:
+        The name itself.
+
+    Raises:
+        LookupError: it is none of them; the message suggests the nearest.
+    """
     if name in names:
         return name
     nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0)

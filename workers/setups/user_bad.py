@@ -11,7 +11,14 @@ from workers.tasks.own_bad import OwnBad, marked_conditions
 
 
 def with_bad(setup: Setup, name: str) -> Setup:
-    """The setup with G_bad from `module:function`; with its own for the name "".
+    """Replace a setup's G_bad by a user's own.
+
+    Args:
+        setup: whose G_bad it is.
+        name: of the function, as `module:function`; "" for none.
+
+    Returns:
+        The setup with that G_bad; as it was for the name "".
 
     Raises:
         LookupError: there is no such module, or no such function in it.

@@ -152,7 +152,12 @@ class Arm:
         )
 
     def apply_speed(self, speed: Sequence[float], force: Sequence[float]) -> None:
-        """Set the joint speeds, in rad/s, that motors of that force, in N·m, seek in the next step."""
+        """Set the joint speeds that motors seek in the next step.
+
+        Args:
+            speed: rad/s, one per moving joint.
+            force: N·m that each motor has for it.
+        """
         pybullet.setJointMotorControlArray(
             self.body,
             self._joints,

@@ -29,9 +29,15 @@ class Cylinder:
     def set_dynamics(
         self, *, mass: float, friction: float, rolling_friction: float, restitution: float
     ) -> None:
-        """Set mass (kg) and contact coefficients; the inertia is that of a solid cylinder.
+        """Set mass and contact coefficients; the inertia is that of a solid cylinder.
 
         Bullet's own inertia of a cylinder is that of its bounding box.
+
+        Args:
+            mass: kg.
+            friction: coefficient of sliding.
+            rolling_friction: coefficient of rolling.
+            restitution: share of the speed kept in a bounce.
         """
         across = mass * (3 * self._radius**2 + self._height**2) / 12
         pybullet.changeDynamics(

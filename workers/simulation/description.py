@@ -16,12 +16,15 @@ _PREFIX = re.compile(r"b3\w+\[[^\]]*\]:\s*")
 
 
 def load_robot(path: Path, client: int, **options: Any) -> int:
-    """Bullet's number of the robot that a URDF file describes.
+    """Load the robot that a URDF file describes.
 
     Args:
         path: of the file.
         client: of the physics server.
         options: further ones of `pybullet.loadURDF`, such as `useFixedBase`.
+
+    Returns:
+        Bullet's number of the robot.
 
     Raises:
         FileNotFoundError: there is no such file; the error names those beside it.
@@ -45,13 +48,16 @@ def load_robot(path: Path, client: int, **options: Any) -> int:
 
 
 def joint_indices(body: int, client: int, described: object, needed: Sequence[str]) -> dict[str, int]:
-    """Bullet's index of every joint of a robot, by name.
+    """Look up the joints of a robot.
 
     Args:
         body: of the robot.
         client: of the physics server.
         described: the file, for the error.
         needed: joints that it must have.
+
+    Returns:
+        Bullet's index of every joint, by name.
 
     Raises:
         ValueError: one of them is missing; the error names it, and all that there are.

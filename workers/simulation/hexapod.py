@@ -26,7 +26,7 @@ class HexapodModel:
         feet: names of the joints whose links may touch the ground.
         home: joint angles at reset, in rad.
         height: of the body's origin at reset, in m.
-        centre: of the body's mass, from its origin, in m.
+        center: of the body's mass, from its origin, in m.
         torques: greatest of each motor, in N·m.
         speeds: greatest of each motor, in rad/s; infinite where a motor is not limited.
         stiffness: share of a position error that a motor removes per simulation step (Bullet's gain).
@@ -89,7 +89,13 @@ class Hexapod:
         return [info[1].decode() for info in infos]
 
     def set_dynamics(self, *, friction: float, restitution: float, damping: float) -> None:
-        """Set the contact coefficients of every link, and the links' damping (linear and angular) in 1/s."""
+        """Set the contact coefficients and the damping of every link.
+
+        Args:
+            friction: coefficient of sliding.
+            restitution: share of the speed kept in a bounce.
+            damping: linear and angular, in 1/s.
+        """
         for link in (_BASE, *self._joints):
             pybullet.changeDynamics(
                 self.body,

@@ -15,7 +15,7 @@ POSE_CHANNELS = (
     *("x", "y", "z"),
     *(f"{column}_axis_{axis}" for column in ("first", "second") for axis in "xyz"),
 )
-"""What follows the name of a pose in the names of its channels, in order."""
+"""In the names of its channels these follow the name of a pose, in this order."""
 
 
 @dataclass(frozen=True)

@@ -60,13 +60,16 @@ class Surface(NamedTuple):
 def ground(
     model: Ground, x: Interval, y: Interval, colors: tuple[Point, Point, Point, Point]
 ) -> list[Surface]:
-    """The part of a ground over that rectangle; tiles are cut where its lighter part ends.
+    """Lay the part of a ground over a rectangle; tiles are cut where its lighter part ends.
 
     Args:
         model: the ground.
         x: at least this extent, in m.
         y: the same along y.
         colors: of both kinds of tiles where the task happens, then of both elsewhere.
+
+    Returns:
+        One surface for each colour that occurs.
     """
     quads: tuple[list[Quad], ...] = ([], [], [], [])
     columns = list(pairwise(_cuts(model.tile, x, model.x)))
@@ -81,14 +84,34 @@ def ground(
 
 
 def flat(left: float, right: float, near: float, far: float, height: float) -> Quad:
-    """A horizontal rectangle."""
+    """Make a horizontal rectangle that is seen from above.
+
+    Args:
+        left: least x, in m.
+        right: greatest x, in m.
+        near: least y, in m.
+        far: greatest y, in m.
+        height: z, in m.
+
+    Returns:
+        The rectangle, its normals along +z.
+    """
     up = (0.0, 0.0, 1.0)
     corners = (left, near, height), (right, near, height), (right, far, height), (left, far, height)
     return Quad(corners, (up, up, up, up))
 
 
 def numbers(model: Ground, y: Interval, color: Point) -> list[Surface]:
-    """Every whole metre of y, written on the ground to be read by one who looks along +y."""
+    """Write every whole metre of y on the ground, to be read by one who looks along +y.
+
+    Args:
+        model: the ground, which says where along x.
+        y: from where to where, in m.
+        color: of the digits.
+
+    Returns:
+        One surface with all digits; none where nothing is to be written.
+    """
     metres = range(math.ceil(y[0]), math.floor(y[1]) + 1)
     places = [(metre, x) for metre in metres for x in model.numbered]
     quads = [quad for metre, x in places for quad in _write(str(metre), x, float(metre))]
@@ -111,7 +134,16 @@ def _cuts(tile: float, extent: Interval, marks: Interval) -> list[float]:
 
 
 def cylinder(radius: float, height: float, colors: tuple[Point, Point]) -> list[Surface]:
-    """An upright cylinder about the origin, its side in stripes of two colours."""
+    """Make an upright cylinder about the origin, its side in stripes of two colours.
+
+    Args:
+        radius: in m.
+        height: in m.
+        colors: of the stripes, in turn.
+
+    Returns:
+        One surface for each colour.
+    """
     quads: tuple[list[Quad], list[Quad]] = ([], [])
     angles = np.linspace(0.0, 2 * math.pi, SIDES + 1).tolist()
     for number, (one, other) in enumerate(pairwise(angles)):

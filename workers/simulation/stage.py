@@ -38,11 +38,17 @@ class Scene(Server):
         self._joints: dict[int, list[int]] = {}
 
     def add_machine(self, urdf: Path | str, joints: Sequence[str]) -> int:
-        """Load a robot with its visual shapes; returns its body.
+        """Load a robot with its visual shapes.
 
         Args:
             urdf: text, or a file: absolute, or below the folder of PyBullet's own robots.
             joints: names of those that `bend` sets, in its order.
+
+        Returns:
+            Its body.
+
+        Raises:
+            ValueError: the robot has no joint of such a name.
         """
         body = self._load(urdf)
         index = self._joint_indices(body)
@@ -80,7 +86,13 @@ class Scene(Server):
         return pybullet.createMultiBody(0.0, -1, shape, physicsClientId=self.client)
 
     def put(self, body: int, position: Sequence[float], orientation: Sequence[float]) -> None:
-        """Put the frame of a body's base there: m, and a quaternion (x, y, z, w)."""
+        """Put the frame of a body's base somewhere.
+
+        Args:
+            body: as from `add_machine` or `add_surface`.
+            position: of the frame, in m.
+            orientation: of the frame, a quaternion (x, y, z, w).
+        """
         dynamics = pybullet.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
         center = pybullet.multiplyTransforms(  # Bullet places the centre of mass
             position, orientation, dynamics[_LOCAL_POSITION], dynamics[_LOCAL_ORIENTATION]
@@ -88,14 +100,27 @@ class Scene(Server):
         pybullet.resetBasePositionAndOrientation(body, *center, physicsClientId=self.client)
 
     def bend(self, body: int, angles: Iterable[float]) -> None:
-        """Set the joints of a robot, in rad, in the order they were named."""
+        """Set the joints of a robot.
+
+        Args:
+            body: as from `add_machine`.
+            angles: in rad, in the order in which the joints were named.
+        """
         for joint, angle in zip(self._joints[body], angles, strict=True):
             pybullet.resetJointState(body, joint, angle, physicsClientId=self.client)
 
     def picture(self, camera: Camera, width: int, height: int) -> UInt8[np.ndarray, "height width 3"]:
-        """What a camera sees that looks at the origin: red, green and blue, from the top left.
+        """Draw what a camera sees that looks at the origin.
 
         Bullet's light aims at the origin as well, and shadows fall only in what it sees from there.
+
+        Args:
+            camera: its target and what it follows are not used.
+            width: in pixels.
+            height: in pixels.
+
+        Returns:
+            Red, green and blue, from the top left, [height, width, 3].
         """
         view = pybullet.computeViewMatrixFromYawPitchRoll(
             _ORIGIN, camera.distance, camera.yaw, camera.pitch, 0.0, upAxisIndex=2

@@ -46,7 +46,12 @@ class World(Server):
         pybullet.stepSimulation(self.client)
 
     def make_intangible(self, body: int, links: Iterable[int]) -> None:
-        """Let links touch nothing from the next `forget_contacts` on, like fingers kept shut."""
+        """Let links touch nothing from the next `forget_contacts` on, like fingers kept shut.
+
+        Args:
+            body: to which they belong.
+            links: their indices; −1 is the base.
+        """
         self._intangible.update((body, link) for link in links)
 
     def forget_contacts(self) -> None:

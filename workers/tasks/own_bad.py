@@ -79,11 +79,27 @@ class OwnBad(Task):
         return self._degrees(values, steps) if self.graded else self._rows(values, steps)
 
     def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
-        """The task's own, with its own bad steps."""
+        """Value an episode by the task's own objective, with its own bad steps.
+
+        Args:
+            observed: all steps of the episode.
+            bad: not looked at.
+
+        Returns:
+            f.
+        """
         return self.task.objective(observed, self.task.is_bad(observed))
 
     def stopped_objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
-        """The task's own, with its own bad steps."""
+        """Value a stopped episode by the task's own objective, with its own bad steps.
+
+        Args:
+            observed: the steps that were run.
+            bad: not looked at.
+
+        Returns:
+            f.
+        """
         return self.task.stopped_objective(observed, self.task.is_bad(observed))
 
     def _degrees(self, values: np.ndarray, steps: int) -> Float32[np.ndarray, "1 time"]:

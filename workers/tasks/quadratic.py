@@ -9,7 +9,7 @@ from workers.environments.environment import Observed
 from workers.tasks.task import Bad, Task
 
 SLOPE = 0.001
-"""Of each coordinate that hardly matters (appendix C)."""
+"""The objective grows by so much along each coordinate that hardly matters (appendix C)."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,14 @@ class Quadratic(Task):
         return np.any((observed.xi < 0.0) | (observed.xi > 1.0), axis=0, keepdims=True)
 
     def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
-        """The formula of the class, of the last step."""
+        """Evaluate the formula of the class at the last step.
+
+        Args:
+            observed: all steps of the episode.
+            bad: not looked at.
+
+        Returns:
+            f.
+        """
         x = observed.xi[:, -1].astype(np.float64)
         return float(((x[: self.intrinsic] + 1) ** 2).sum() + SLOPE * x[self.intrinsic :].sum())

@@ -61,7 +61,15 @@ class StablePush(Task):
         )
 
     def objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
-        """An object pushed off the table counts as tipped, since it would fall."""
+        """Value a push; an object pushed off the table counts as tipped, since it would fall.
+
+        Args:
+            observed: all steps of the episode.
+            bad: not looked at.
+
+        Returns:
+            f, in m.
+        """
         y_max = self.table_y[1] - self.table_y[0]
         total = 0.0
         for number, (_, y_start) in enumerate(self.starts):
@@ -71,7 +79,15 @@ class StablePush(Task):
         return total
 
     def stopped_objective(self, observed: Observed, bad: Bad) -> float:  # noqa: ARG002
-        """−y_max for every object, as if it had fallen (section 7 of the paper: −2 y_max)."""
+        """Value a stopped push as if every object had fallen.
+
+        Args:
+            observed: not looked at.
+            bad: not looked at.
+
+        Returns:
+            −y_max for every object, in m (section 7 of the paper: −2 y_max).
+        """
         return self.objective_limits[0]
 
     def _object(self, observed: Observed, number: int) -> Float32[np.ndarray, "9 time"]:

@@ -9,10 +9,11 @@ from workers.environments.environment import Observed
 from workers.tasks.walk import Walk, roll_and_pitch
 
 StopRule = Callable[[Observed], str]
-"""From what is seen after one step to the reason to stop there; "" to go on."""
+"""It leads from what is seen after one step to the reason to stop there; "" means to go on."""
 
 STOPPED = "stopped"
-"""The bad condition of setups with a stop rule: the step that gave the reason, and all not run after it."""
+"""Setups with a stop rule have this bad condition: it holds at the step that gave the reason, and at all that
+are not run after it."""
 
 OUTSIDE = "hand outside workspace"
 LOW = "hand near table"

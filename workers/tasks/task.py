@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float32
 from workers.environments.environment import Observed
 
 Bad = Bool[np.ndarray, "conditions time"] | Float32[np.ndarray, "1 time"]
-"""What G_bad says of every step: which conditions hold, or, of a graded one, the degree in [0, 1]."""
+"""G_bad says of every step which conditions hold, or, if it is graded, the degree in [0, 1]."""
 
 BITS = 8
 """A step has so many bits in a dataset: at most so many bad conditions, `stopped` included."""
@@ -38,15 +38,39 @@ class Task(ABC):
 
     @abstractmethod
     def objective(self, observed: Observed, bad: Bad) -> float:
-        """f, the number Bayesian optimisation maximises."""
+        """Value an episode: f of the paper.
+
+        Args:
+            observed: all steps of the episode.
+            bad: what `is_bad` says of them.
+
+        Returns:
+            The number that Bayesian optimisation maximises.
+        """
 
     def stopped_objective(self, observed: Observed, bad: Bad) -> float:
-        """The objective of an episode that a stop rule ended: f of the steps it ran, which are `observed`."""
+        """Value an episode that a stop rule ended.
+
+        Args:
+            observed: the steps that were run.
+            bad: what `is_bad` says of them.
+
+        Returns:
+            f of those steps, unless a task knows better.
+        """
         return self.objective(observed, bad)
 
 
 def check_bad(task: Task, bad: Any, steps: int) -> Bad:
-    """What `is_bad` of a task returned for so many steps, if an episode can hold it.
+    """Refuse what `is_bad` of a task returned if an episode cannot hold it.
+
+    Args:
+        task: whose `is_bad` it was.
+        bad: what it returned.
+        steps: that it saw.
+
+    Returns:
+        Booleans, [conditions, steps], or float32 degrees, [1, steps].
 
     Raises:
         ValueError: it has another type or shape than it must, or degrees outside [0, 1].
@@ -72,6 +96,10 @@ def check_bad(task: Task, bad: Any, steps: int) -> Bad:
 
 def require_objective(task: Task, f: float) -> None:
     """Refuse an objective of a task that no dataset can hold.
+
+    Args:
+        task: whose objective it is, for the error.
+        f: the objective.
 
     Raises:
         ValueError: it is not a finite number.

@@ -55,7 +55,15 @@ class Walk(Task):
         )
 
     def objective(self, observed: Observed, bad: Bad) -> float:
-        """Ten times the metres walked towards +y, less one for each step with a fast joint."""
+        """Value a walk towards +y.
+
+        Args:
+            observed: all steps of the episode.
+            bad: rows as in `conditions`; only the first counts.
+
+        Returns:
+            Ten times the metres walked, less one for each step with a fast joint.
+        """
         return 10.0 * float(observed.xi[self.channel + 1, -1]) - float(np.count_nonzero(bad[0]))
 
 

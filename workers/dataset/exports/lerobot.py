@@ -66,9 +66,16 @@ _INDICES = ("frame_index", "episode_index", "index", "task_index")
 
 
 def export_lerobot(dataset: Dataset, out: Path) -> Iterator[Shard]:
-    """Write the dataset to an existing folder, one shard in memory at a time; yield each shard.
+    """Write the dataset to a folder, one shard in memory at a time.
 
     Episodes are numbered from 0 without gaps, as the format asks; `svaedc.episode` is the number here.
+
+    Args:
+        dataset: what is exported.
+        out: an existing folder.
+
+    Yields:
+        Each shard once it is written.
 
     Raises:
         ValueError: a shard is damaged, or two overlap.

@@ -13,13 +13,16 @@ from workers.dataset.shards import Shard
 
 
 def export_npz(dataset: Dataset, out: Path) -> Iterator[Shard]:
-    """Write `episodes-START-STOP.npz` for every shard and the identity as `dataset.json`; yield each shard.
+    """Write `episodes-START-STOP.npz` for every shard and the identity as `dataset.json`.
 
     One shard is in memory at a time. The archives hold no Python objects: `numpy.load` opens them as is.
 
     Args:
         dataset: what is exported.
         out: an existing folder.
+
+    Yields:
+        Each shard once it is written.
 
     Raises:
         ValueError: a shard is damaged, or two overlap.

@@ -16,7 +16,15 @@ from workers.dataset.storage.temporary import WRITING, writer
 
 @contextmanager
 def temporary_file(folder: Location, name: str) -> Iterator[Path]:
-    """A path for a file of this writer that is not finished; whatever lies there is removed at the end."""
+    """Offer a path for a file of this writer that is not finished; whatever lies there is removed at the end.
+
+    Args:
+        folder: of the dataset; on a disk it must exist.
+        name: of the file once it is finished.
+
+    Yields:
+        A path on this machine: below the folder, or in memory for an object store.
+    """
     if not isinstance(folder, Path):
         with _file_in_memory(name) as temporary:
             yield temporary
@@ -44,6 +52,10 @@ def link(source: Location, target: Location) -> None:
     """Give a finished file its final name, durably, unless another writer was first.
 
     In an object store two writers at the same moment may both write, so the bytes must be the same.
+
+    Args:
+        source: the finished file.
+        target: its final name.
     """
     if isinstance(source, Path) and isinstance(target, Path):
         with suppress(FileExistsError):
@@ -54,7 +66,12 @@ def link(source: Location, target: Location) -> None:
 
 
 def move(source: Path, target: Location) -> None:
-    """Let a finished file take the place of what has its final name."""
+    """Let a finished file take the place of what has its final name.
+
+    Args:
+        source: the finished file.
+        target: its final name.
+    """
     if isinstance(target, Path):
         source.replace(target)
     else:

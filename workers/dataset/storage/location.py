@@ -19,7 +19,15 @@ def location(text: str) -> Location:
 
 
 def files(folder: Location, pattern: str) -> list[Location]:
-    """The files directly in a folder whose names fit a pattern, in their order; none without a folder."""
+    """Look for the files directly in a folder whose names fit a pattern.
+
+    Args:
+        folder: which need not exist.
+        pattern: of names, with `*` and `?`, without slashes.
+
+    Returns:
+        Their paths, in the order of their names.
+    """
     return sorted(folder.glob(pattern), key=_name)
 
 

@@ -13,7 +13,7 @@ ATTEMPTS = 3
 """A store that is away is given up after that many attempts, each of at most so long."""
 
 OPTIONS = ("endpoint_override", "region", "scheme")
-"""What may stand behind the `?` of an address; PyArrow's names."""
+"""These names, which are PyArrow's, may stand behind the `?` of an address."""
 
 Options = tuple[tuple[str, str], ...]
 
@@ -49,7 +49,15 @@ def reaching(path: object) -> Iterator[None]:
 
 
 def refusal(path: object, error: Exception) -> StoreError | None:
-    """What an error says about the store; None if it is about something else."""
+    """Explain what an error says about the store.
+
+    Args:
+        path: that was asked for, for the text.
+        error: as PyArrow raised it.
+
+    Returns:
+        The error to raise instead; None if it is about something else.
+    """
     if isinstance(error, StoreError):
         return StoreError(error.errno, error.strerror)
     is_of_store = "AWS Error" in str(error) and not _GONE.search(str(error))
@@ -87,6 +95,10 @@ def is_found(info: Any) -> bool:
 @cache
 def require_bucket(bucket: str, options: Options) -> None:
     """Make sure, once in a process, that a bucket exists.
+
+    Args:
+        bucket: its name.
+        options: of the connection, by the names in `OPTIONS`.
 
     Raises:
         StoreError: it does not, or the store cannot be reached, or refuses.

@@ -10,7 +10,7 @@ from workers.dataset.storage.s3 import OPTIONS, Options, connection, is_found, r
 from workers.dataset.storage.temporary import WRITING, writer
 
 ONE_REQUEST = 10 << 20
-"""Bytes that PyArrow sends at once."""
+"""PyArrow sends so many bytes at once."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,12 @@ class ObjectPath:
         return str(self)
 
     def mkdir(self, *, parents: bool = False, exist_ok: bool = False) -> None:
-        """Nothing, for a store has no folders."""
+        """Do nothing, for a store has no folders.
+
+        Args:
+            parents: as of `pathlib.Path`.
+            exist_ok: as of `pathlib.Path`.
+        """
 
     def exists(self) -> bool:
         """Whether there is such an object, or one below; a bucket that is missing is refused."""

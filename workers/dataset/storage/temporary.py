@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 WRITING = ".writing"
-"""Folder, below the dataset, of files that are not finished."""
+"""This folder, below the dataset, holds the files that are not finished."""
 
 _WRITER = re.compile(
     r"(?:.*\.)?(?P<host>[^.]+)\.(?P<boot>[^._]+)(?:_(?P<ids>\d+))?\.(?P<pid>\d+)(?:_(?P<born>\d+))?"
