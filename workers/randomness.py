@@ -7,7 +7,7 @@ import numpy as np
 
 
 class Stream(StrEnum):
-    """What is drawn. Streams are independent of each other; a name decides every draw, so none ever changes."""
+    """What is drawn. Streams are independent of each other; a name decides what is drawn, and never changes."""
 
     CONTROLLER = "controller"
     """The x of an episode of a dataset; the index is that of the controller."""

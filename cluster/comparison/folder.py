@@ -110,14 +110,14 @@ class ComparisonFolder:
         """
         append(key.path(self.path), trial)
 
-    def keys(self) -> list[RunKey]:
+    def begun_keys(self) -> list[RunKey]:
         """Every run that has begun, in order; of files that are no run's, such as copies, nothing is said."""
         matches = (NAME.fullmatch(path.name) for path in (self.path / RUNS).glob("*.jsonl"))
         return sorted(RunKey(match["method"], int(match["run"])) for match in matches if match)
 
     def runs(self) -> dict[RunKey, list[Trial]]:
         """The trials of every run that has begun, in order."""
-        return {key: self.trials(key) for key in self.keys()}
+        return {key: self.trials(key) for key in self.begun_keys()}
 
     def write_table(self, runs: Runs, facts: Mapping[str, str]) -> Path:
         """`trials.parquet`: one row per trial of all runs.

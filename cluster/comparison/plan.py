@@ -149,7 +149,7 @@ class ComparisonPlan:
         Raises:
             UserError: the folder holds another comparison, or runs whose seeds are for something else.
         """
-        self.grid.require_purpose(self.job.folder, {key.run for key in self.job.folder.keys()})
+        self.grid.require_purpose(self.job.folder, {key.run for key in self.job.folder.begun_keys()})
         return self.job.folder.claim(self.identity, self.model)
 
     def missing(self, runs: Runs) -> list[RunKey]:

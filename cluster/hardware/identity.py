@@ -60,7 +60,7 @@ class CampaignIdentity:
         return hashlib.sha256(canonical({**self.facts(), "name": name}).encode()).hexdigest()
 
     def facts(self) -> dict[str, Any]:
-        """All fields by name; `draws` came later than the first campaigns, and is left out where it is theirs."""
+        """All fields by name; `draws` is left out of campaigns that began before there was such a field."""
         return {field: value for field, value in asdict(self).items() if (field, value) != ("draws", 1)}
 
     def require(self, asked: "CampaignIdentity", place: str) -> None:

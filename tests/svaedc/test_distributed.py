@@ -35,7 +35,7 @@ settings = TrainingSettings(stage, replace(stage, updates=20), Weighting(1.0, 1.
 if world > 1:
     init_process_group("gloo", init_method=f"file://{folder}/meeting", rank=rank, world_size=world)
 wrap = DistributedDataParallel if world > 1 else lambda module: module
-list(fit(model, *halves, settings, context=DistributedContext(WorkerRank(rank, world), parallelise=wrap)))
+list(fit(model, *halves, settings, context=DistributedContext(WorkerRank(rank, world), parallelize=wrap)))
 torch.save(model.state_dict(), folder / f"{rank}.pt")
 if world > 1:
     destroy_process_group()

@@ -119,7 +119,7 @@ class DeskProposals:
     def suggest(self, history, index):
         return self.method(history, generator(self.seed, Stream.SUGGESTION, index))
 
-    def predict(self, x):
+    def predict(self, _):
         return None
 
 
