@@ -19,6 +19,7 @@ import psutil
 
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
 from cluster.datasets.collect import collect
+from cluster.datasets.plan import plan_collection
 from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
 from workers import setups
@@ -134,13 +135,16 @@ def main():
         with connect(ray, address=None, parts=()) as session:
             at_rest, meter, begin = idle(), Meter(), time.monotonic()
             dataset = collect(
-                setup=setups.load("franka"),
-                episodes=episodes,
-                folder=folder / "dataset",
-                seed=0,
-                settings=CollectSettings(),
-                session=session,
-                tracker=tracker,
+                plan_collection(
+                    setup=setups.load("franka"),
+                    episodes=episodes,
+                    folder=folder / "dataset",
+                    seed=0,
+                    settings=CollectSettings(),
+                ),
+                CollectSettings(),
+                session,
+                tracker,
             )
             wall, spent = time.monotonic() - begin, meter.stop()
         [run] = tracker.client.search_runs([tracker.experiment])

@@ -19,6 +19,7 @@ import psutil
 
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
 from cluster.datasets.collect import collect
+from cluster.datasets.plan import plan_collection
 from cluster.datasets.worker import RolloutActor
 from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
@@ -103,14 +104,13 @@ def measured(episodes: int, session, parent: Path) -> str:
     watch = Watch(folder, episodes // settings.episodes_per_shard)
     begin = time.monotonic()
     dataset = collect(
-        setup=setups.load("franka"),
-        episodes=episodes,
-        folder=folder,
-        seed=0,
-        settings=settings,
-        session=session,
-        tracker=tracker,
-        actor=ConstantActor,
+        plan_collection(
+            setup=setups.load("franka"), episodes=episodes, folder=folder, seed=0, settings=settings
+        ),
+        settings,
+        session,
+        tracker,
+        ConstantActor,
     )
     wall = time.monotonic() - begin
     driver, total = watch.stop()

@@ -24,6 +24,7 @@ from torch import nn
 
 from cluster.config import CollectSettings, RaySettings, TrackingSettings
 from cluster.datasets.collect import collect
+from cluster.datasets.plan import plan_collection
 from cluster.runtime.session import connect
 from cluster.tracking import open_tracker
 from cluster.training.worker import TrainingJob, episodes, train_together
@@ -144,13 +145,16 @@ def under_ray(folder, session):
     """CPU seconds per update under Ray Train, ours and the plain loop's; and the plain loop's here."""
     tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db"))
     dataset = collect(
-        setup=setups.load("franka"),
-        episodes=512,
-        folder=folder / "dataset",
-        seed=0,
-        settings=CollectSettings(episodes_per_shard=128),
-        session=session,
-        tracker=tracker,
+        plan_collection(
+            setup=setups.load("franka"),
+            episodes=512,
+            folder=folder / "dataset",
+            seed=0,
+            settings=CollectSettings(episodes_per_shard=128),
+        ),
+        CollectSettings(episodes_per_shard=128),
+        session,
+        tracker,
     )
     (folder / "model").mkdir()
     paths = [(folder / name).resolve() for name in ("dataset", "model", "cache")]

@@ -5,22 +5,22 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from cluster.comparison.compare import Comparison, compare
-from cluster.comparison.plan import Grid, plan_comparison
+from cluster.comparison.compare import Comparison
 from cluster.config import Settings
-from cluster.datasets.collect import collect
-from cluster.progress import say, timing
-from cluster.runtime.placement import free_machines
+from cluster.progress import say
+from cluster.reproduction.experiment import NINE, Panel, Recipe
+from cluster.reproduction.plan import Reproduction, Scale
+from cluster.reproduction.run import preflight, run_steps
 from cluster.runtime.session import Session
 from cluster.tracking import Tracker
-from cluster.training.launch import placement_of
-from cluster.training.train import MINIMUM_EPISODES, train
+from cluster.training.train import MINIMUM_EPISODES
 from svaedc.analysis.summary import Difference
-from workers import setups
 
 SETUP = "franka"
 OURS = "svae-dc"
 BASELINES = ("random", "screened-random")
+STEPS = {"collect": "1/3 collect", "train": "2/3 train", "compare": "3/3 compare"}
+"""What a person reads of the steps of the demo."""
 
 
 @dataclass(frozen=True)
@@ -60,67 +60,49 @@ def demo(
     Raises:
         UserError: a stage cannot run; the cluster is checked for all of them before the first.
     """
-    _preflight(settings, size, session)
+    reproduction, settings = plan_demo(folder, size), _demo_settings(folder, settings, size)
+    preflight(reproduction, settings, session)
     say(
         f"The main job at toy size, in {folder}: {size.episodes} simulated episodes instead of 500,000, "
         f"{size.runs} runs of {size.trials} trials instead of 50 of 20. It shows the machine at work, "
         "and proves nothing about the methods."
     )
-    with timing("1/3 collect"):
-        collect(
-            setup=setups.load(SETUP),
-            episodes=size.episodes,
-            folder=folder / "dataset",
-            seed=0,
-            settings=settings.collect,
-            session=session,
-            tracker=tracker,
-        )
-    with timing("2/3 train"):
-        _train(folder, settings, session, tracker, size)
-    with timing("3/3 compare"):
-        comparison = _compare(folder, settings, session, tracker, size)
+    [comparison] = run_steps(reproduction, settings, session, tracker, STEPS).values()
     say(conclusion(folder, comparison, f"svaedc ui --set tracking.uri={tracker.uri}"))
     return comparison
 
 
-def _train(folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize) -> None:
+def plan_demo(folder: Path, size: DemoSize = FULL) -> Reproduction:
+    """The demo as a recipe: one comparison on the Franka push, with the data and the model that it needs.
+
+    Args:
+        folder: of everything.
+        size: how much of it.
+
+    Returns:
+        What `run_steps` does.
+    """
+    panel = Panel("comparison", "", SETUP, size.methods, size.trials)
+    return Reproduction(
+        recipe=Recipe("", "The main job at toy size", SETUP, size.runs, (panel,), ()),
+        scale=Scale("compact", {SETUP: size.episodes}),
+        folder=folder,
+        episodes=size.episodes,
+        runs=size.runs,
+        dataset=folder / "dataset",
+        collects=True,
+        models={NINE: folder / "model"},
+        trains=(NINE,),
+        results=folder,
+    )
+
+
+def _demo_settings(folder: Path, settings: Settings, size: DemoSize) -> Settings:
+    """A short training and a cache of its own, unless the user asked for others."""
     usual = {"updates": size.updates, "cache_folder": folder / "cache"}
     given = settings.train.model_fields_set
-    train(
-        folder=folder / "dataset",
-        model=folder / "model",
-        preset="compact",
-        seed=0,
-        settings=settings.train.model_copy(
-            update={name: value for name, value in usual.items() if name not in given}
-        ),
-        session=session,
-        tracker=tracker,
-    )
-
-
-def _compare(
-    folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize
-) -> Comparison:
-    plan = plan_comparison(
-        setup=setups.load(SETUP),
-        grid=Grid(size.methods, seed=0, runs=size.runs),
-        trials=size.trials,
-        gap="paper",
-        model=folder / "model",
-        folder=folder / "comparison",
-        settings=settings.compare,
-    )
-    return compare(plan, session, tracker)
-
-
-def _preflight(settings: Settings, size: DemoSize, session: Session) -> None:
-    """Refuse now what a later stage would refuse after minutes of work."""
-    shards = math.ceil(size.episodes / settings.collect.episodes_per_shard)
-    session.preflight(min(settings.collect.actor_count(session.cpus), shards))
-    placement_of(settings.train, free_machines(session))
-    session.preflight(settings.compare.slots)
+    changed = {name: value for name, value in usual.items() if name not in given}
+    return settings.model_copy(update={"train": settings.train.model_copy(update=changed)})
 
 
 def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:

@@ -5,13 +5,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from cluster.errors import UsageError, UserError
-from workers import setups
-from workers.dataset.storage.location import Location, location
-from workers.setups import Setup
-from workers.setups.user_bad import with_bad
+from workers.setups.registry import SETUPS
+
+if TYPE_CHECKING:
+    from workers.dataset.storage.location import Location
+    from workers.setups import Setup
 
 
 def durable(path: Path | None) -> Path | None:
@@ -32,7 +34,7 @@ def durable(path: Path | None) -> Path | None:
     return path.expanduser().absolute()
 
 
-def dataset_location(text: str) -> Location:
+def dataset_location(text: str) -> "Location":
     """Where a dataset lies: a folder, or `s3://bucket/prefix`.
 
     What the environment says of the store becomes part of its address, so that every process goes to the same
@@ -41,6 +43,8 @@ def dataset_location(text: str) -> Location:
     Raises:
         UsageError: it has a scheme, but is no address of an object store.
     """
+    from workers.dataset.storage.location import location
+
     try:
         place = location(text)
     except ValueError as error:
@@ -60,7 +64,7 @@ def _store_of_environment() -> dict[str, str]:
     return {name: value for name, value in options.items() if value}
 
 
-def durable_dataset(text: str) -> Location:
+def durable_dataset(text: str) -> "Location":
     """The same; a relative path is refused where `durable` refuses it."""
     place = dataset_location(text)
     if isinstance(place, Path):
@@ -69,22 +73,31 @@ def durable_dataset(text: str) -> Location:
     return place
 
 
-def setup_of(name: str, bad: str = "") -> Setup:
+def setup_of(name: str, bad: str = "") -> "Setup":
     """The setup of that name, with G_bad of that name unless it is ""; an unknown one is a usage error.
 
     Users' modules are found in the working directory too, after everything that is installed.
     """
+    from workers.setups.registry import load
+
     sys.path.append(str(Path.cwd()))
     with usage_errors():
-        return with_bad(setups.load(name), bad)
+        found = load(name)
+        if not bad:
+            return found
+        from workers.setups.user_bad import with_bad
+
+        return with_bad(found, bad)
 
 
-def working(setup: Setup, seed: int) -> Setup:
+def require_working_setup(setup: "Setup", seed: int) -> "Setup":
     """The setup, tried out if users supplied a part of it: before anything starts or claims a folder.
 
     Raises:
         UserError: it does not work.
     """
+    if setup.name in SETUPS and not setup.task.bad_name:
+        return setup
     from workers.collection.shard import require_working
 
     try:

@@ -113,17 +113,21 @@ def small_dataset(ray_session, tmp_path_factory: pytest.TempPathFactory) -> Path
 def _collected(episodes: int, per_shard: int, session, tmp_path_factory: pytest.TempPathFactory) -> Path:
     from cluster.config import CollectSettings, TrackingSettings
     from cluster.datasets.collect import collect
+    from cluster.datasets.plan import plan_collection
     from cluster.tracking import open_tracker
     from workers import setups
 
     folder = tmp_path_factory.mktemp("collected")
     collect(
-        setup=setups.load("franka"),
-        episodes=episodes,
-        folder=folder / "dataset",
-        seed=0,
-        settings=CollectSettings(actors=2, episodes_per_shard=per_shard),
-        session=session,
-        tracker=open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db")),
+        plan_collection(
+            setup=setups.load("franka"),
+            episodes=episodes,
+            folder=folder / "dataset",
+            seed=0,
+            settings=CollectSettings(actors=2, episodes_per_shard=per_shard),
+        ),
+        CollectSettings(actors=2, episodes_per_shard=per_shard),
+        session,
+        open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db")),
     )
     return folder / "dataset"

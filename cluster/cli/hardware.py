@@ -1,19 +1,17 @@
 """`svaedc hardware`: campaigns on one robot, and what a person decides in them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from cluster.cli.options import Address, Config, Overrides, Seed, TrainedModel, services, settings_of
-from cluster.config import HardwareSettings
-from cluster.hardware import operator
-from cluster.hardware.identity import Approval
-from cluster.hardware.status import Status
+from cluster.hardware.states import Approval
 from cluster.inputs import durable
 from cluster.progress import say
+
+if TYPE_CHECKING:
+    from cluster.hardware.status import Status
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -60,7 +58,7 @@ def start(
     settings = settings_of(config, overrides)
     checkpoint = checkpoint_path(model) if model else None
     plan = CampaignPlan(
-        identify(robot, method, trials, seed, _pool(settings.hardware), checkpoint, approval),
+        identify(robot, method, trials, seed, settings.hardware.pool_size, checkpoint, approval),
         folder,
         checkpoint,
         pace,
@@ -73,12 +71,16 @@ def start(
 @app.command()
 def status(folder: Folder) -> None:
     """How a campaign stands, trial by trial, and what it needs next."""
+    from cluster.hardware import operator
+
     _show(operator.status(folder))
 
 
 @app.command()
 def approve(folder: Folder, trial: TrialNumber, who: Who) -> None:
     """Let a checked trial onto the robot."""
+    from cluster.hardware import operator
+
     operator.approve(folder, trial, who)
     _show(operator.status(folder))
 
@@ -94,6 +96,8 @@ def resolve(
     y: Annotated[float | None, typer.Option("--y", help="Badness in [0, 1], of a measured trial.")] = None,
 ) -> None:
     """Say what became of an unknown trial, once the robot stands still and is reset."""
+    from cluster.hardware import operator
+
     operator.resolve(folder, trial, outcome, who, note, f, y)
     _show(operator.status(folder))
 
@@ -101,20 +105,21 @@ def resolve(
 @app.command()
 def export(folder: Folder) -> None:
     """Print the whole journal as JSON lines: the campaign, then every event."""
+    from cluster.hardware import operator
+
     for line in operator.export(folder):
         typer.echo(line)
 
 
-def _pool(settings: HardwareSettings) -> int:
-    return settings.pool_size
-
-
-def _report(now: Status) -> None:
+def _report(now: "Status") -> None:
     best = "" if now.best is None else f", best objective {now.best:+.3f}"
     say(f"{now.name}: {now.measured} of {now.planned} trials measured{best}")
 
 
-def _show(now: Status) -> None:
+def _show(now: "Status") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     table = Table(
         "trial", "state", "kind", "f", "y", title=f"{now.name}: {now.standing}", title_justify="left"
     )

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cluster.config import Part, Settings
 from cluster.inputs import durable, durable_dataset
-from cluster.runtime.signals import interruptible
-from cluster.settings import load_settings
-from workers import setups
+from workers.setups.registry import SETUPS
 
 if TYPE_CHECKING:
+    from cluster.config import Part, Settings
     from cluster.runtime.session import Session
     from cluster.tracking import Tracker
 
@@ -39,9 +37,7 @@ Address = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
-SetupName = Annotated[
-    str, typer.Option("--setup", help=f"{', '.join(setups.SETUPS)}, or a module of your own.")
-]
+SetupName = Annotated[str, typer.Option("--setup", help=f"{', '.join(SETUPS)}, or a module of your own.")]
 DatasetFolder = Annotated[
     Any,  # a Location, which typer does not know
     typer.Option(
@@ -54,17 +50,20 @@ TrainedModel = Annotated[
 ]
 
 
-def settings_of(config: Path | None, overrides: list[str] | None) -> Settings:
+def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":
     """The settings of a command."""
+    from cluster.settings import load_settings
+
     return load_settings(config, overrides or [])
 
 
 @contextmanager
 def services(
-    settings: Settings, address: str | None, parts: tuple[Part, ...] = ("dashboard",)
+    settings: "Settings", address: str | None, parts: "tuple[Part, ...]" = ("dashboard",)
 ) -> Iterator[tuple["Session", "Tracker"]]:
     """The tracker, whose store must exist before anything else starts, and the Ray session."""
     from cluster.runtime.session import connect
+    from cluster.runtime.signals import interruptible
     from cluster.tracking import open_tracker
 
     store = settings.tracking.uri.removeprefix("sqlite:///")

@@ -1,15 +1,17 @@
 """`svaedc reproduce`: a figure of the paper, from data to picture."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cluster.cli.options import Address, Config, Overrides, services, settings_of
-from cluster.config import Settings
 from cluster.errors import UsageError
 from cluster.inputs import durable, durable_dataset, usage_errors
-from workers.dataset.storage.location import Location
+
+if TYPE_CHECKING:
+    from cluster.config import Settings
+    from workers.dataset.storage.location import Location
 
 _SCALE_HELP = (
     "machine: what two cores collect in up to an hour; paper: 500,000 episodes and its own training."
@@ -81,26 +83,26 @@ def reproduce(
         models=tuple(path.expanduser().absolute() for path in model or ()),
     )
     if plan:
-        _foretell(reproduction, settings, address)
+        _say_cost(reproduction, settings, address)
         return
     with services(settings, address) as (session, tracker):
         run_reproduction(reproduction, settings, session, tracker)
 
 
-def _foretell(reproduction: Any, settings: Settings, address: str | None) -> None:
+def _say_cost(reproduction: Any, settings: "Settings", address: str | None) -> None:
     """Starts nothing; a cluster that runs is asked for its CPUs."""
     from cluster.reproduction.plan import cores
-    from cluster.reproduction.run import foretell
+    from cluster.reproduction.run import say_cost
     from cluster.runtime.session import connect
 
     if not address:
-        foretell(reproduction, settings, cores(settings))
+        say_cost(reproduction, settings, cores(settings))
         return
     with connect(settings.ray, address) as session:
-        foretell(reproduction, settings, session.cpus)
+        say_cost(reproduction, settings, session.cpus)
 
 
-def _require_consistent(settings: Settings, dataset: Location | None, episodes: int | None) -> None:
+def _require_consistent(settings: "Settings", dataset: "Location | None", episodes: int | None) -> None:
     if settings.train.latent != "preset":
         raise UsageError("a figure's panels decide the size of the latent path: leave train.latent out")
     if dataset is not None and episodes is not None:

@@ -1,11 +1,9 @@
 """`svaedc collect`: collect what is missing in a dataset and record it, or foretell what that will cost."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 from cluster.config import CollectSettings
-from cluster.datasets.gather import growth, open_and_plan, rollout_pool, work
+from cluster.datasets.gather import growth, roll_out, rollout_pool
 from cluster.datasets.pilot import add_cost, begin, metrics, plan_text, review
+from cluster.datasets.plan import CollectionPlan, episodes_in, say_complete
 from cluster.datasets.progress import CollectionProgress
 from cluster.datasets.quarantine import FOLDER, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
@@ -15,123 +13,92 @@ from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 from workers.collection.forecast import forecast
 from workers.dataset.folder import Dataset
-from workers.dataset.identity import Identity, identity_of
-from workers.dataset.shards import Shard
-from workers.dataset.storage.location import Location
-from workers.setups import Setup
 
 PILOT_SHARDS = 4
 """A plan rolls out that many shards, or two on every actor if that is more."""
 
 
 def collect(
-    *,
-    setup: Setup,
-    episodes: int,
-    folder: Location,
-    seed: int,
-    repeats: int = 1,
+    plan: CollectionPlan,
     settings: CollectSettings,
     session: Session,
     tracker: Tracker,
     actor: type[RolloutActor] = RolloutActor,
 ) -> Dataset:
-    """Bring a dataset to that many episodes; what exists already is kept and never rewritten.
+    """Bring a dataset to the episodes of a plan; what exists already is kept and never rewritten.
+
+    Args:
+        plan: what is missing.
+        settings: of the collection.
+        session: where the actors run.
+        tracker: that records it.
+        actor: class of the rollout processes.
+
+    Returns:
+        The dataset.
 
     Raises:
-        UserError: the folder holds another dataset, the disk is full, or shards kept failing.
+        UserError: the cluster has no room, the disk is full, or shards kept failing.
     """
-    identity = _identity(setup, seed, repeats, settings)
-    dataset, plan = open_and_plan(identity, episodes, folder)
-    if not plan:
-        release(dataset)  # a driver that was killed at its end may have put aside what another collected
-        say(f"{folder} already holds {dataset.episodes()} episodes: nothing to do")
+    dataset, missing = plan.dataset, plan.missing
+    if not missing:
+        say_complete(plan)
         return dataset
-    actors = min(settings.actor_count(session.cpus), len(plan))
+    actors = min(settings.actor_count(session.cpus), len(missing))
     session.preflight(actors)
-    parameters = _parameters(identity, episodes, actors, settings)
-    with tracker.run(f"collect {setup.name}", "collect", parameters) as run:
-        counts = CollectionProgress(planned=_size(plan))
+    with tracker.run(
+        f"collect {dataset.identity.setup}", "collect", plan.parameters(actors, settings)
+    ) as run:
+        counts = CollectionProgress(planned=episodes_in(missing))
         pool = rollout_pool(dataset, settings, actors, actor, growth(settings))
         try:
-            work(dataset, plan, episodes, counts, run, pool)
+            roll_out(plan, missing, counts, run, pool)
         finally:
             add_cost(dataset, counts, pool.actor_seconds)
-        _record(dataset, episodes, counts, run)
+        _record(plan, counts, run)
     return dataset
 
 
-def foretell(
-    *,
-    setup: Setup,
-    episodes: int,
-    folder: Location,
-    seed: int,
-    repeats: int = 1,
-    settings: CollectSettings,
-    session: Session,
-    tracker: Tracker,
+def collect_pilot(
+    plan: CollectionPlan, settings: CollectSettings, session: Session, tracker: Tracker
 ) -> None:
-    """Collect the first few shards of a dataset, and say what all of it will cost.
+    """Collect the first few shards of a plan, and say what all of it will cost.
+
+    Args:
+        plan: what is missing.
+        settings: of the collection.
+        session: where the actors run.
+        tracker: that records it.
 
     Raises:
         UserError: as `collect` does, or too little is left to collect.
     """
-    identity = _identity(setup, seed, repeats, settings)
-    dataset, plan = open_and_plan(identity, episodes, folder)
-    actors = min(settings.actor_count(session.cpus), len(plan))
-    pilot = plan[: max(PILOT_SHARDS, 2 * actors)]
+    dataset, missing = plan.dataset, plan.missing
+    actors = min(settings.actor_count(session.cpus), len(missing))
+    pilot = missing[: max(PILOT_SHARDS, 2 * actors)]
     if len(pilot) < 2:
         raise UserError(
-            f"{_size(plan)} episodes are left to collect in {folder}: too few to plan for; leave out --plan"
+            f"{episodes_in(missing)} episodes are left to collect in {dataset.folder}: too few to plan for; "
+            "leave out --plan"
         )
     session.preflight(actors)
-    parameters = _parameters(identity, episodes, actors, settings)
-    with tracker.run(f"plan {setup.name}", "plan", parameters) as run:
-        counts = CollectionProgress(planned=_size(pilot))
-        reports = work(dataset, pilot, episodes, counts, run, rollout_pool(dataset, settings, actors))
+    with tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run:
+        counts = CollectionProgress(planned=episodes_in(pilot))
+        reports = roll_out(plan, pilot, counts, run, rollout_pool(dataset, settings, actors))
         if len(reports) < 2:
             raise UserError(
                 f"{len(pilot) - len(reports)} of {len(pilot)} shards kept failing, so there is no plan; "
                 f"their errors are in {dataset.folder / FOLDER}, and the same command tries them again"
             )
-        expected = forecast(reports, _size(plan), actors)
-        begin(dataset, episodes, expected, counts)
-        say(plan_text(expected, _size([report.shard for report in reports])))
+        expected = forecast(reports, episodes_in(missing), actors)
+        begin(dataset, plan.episodes, expected, counts)
+        say(plan_text(expected, episodes_in([report.shard for report in reports])))
         run.metrics(counts.metrics() | metrics(expected), step=counts.episodes)
 
 
-def _identity(setup: Setup, seed: int, repeats: int, settings: CollectSettings) -> Identity:
-    return identity_of(
-        setup,
-        seed=seed,
-        episodes_per_shard=settings.episodes_per_shard,
-        repeats=repeats,
-        storage=settings.storage,
-    )
-
-
-def _parameters(
-    identity: Identity, episodes: int, actors: int, settings: CollectSettings
-) -> Mapping[str, Any]:
-    return {
-        "setup": identity.setup,
-        "episodes": episodes,
-        "seed": identity.seed,
-        "repeats": identity.repeats,
-        "bad": identity.bad_name,
-        "actors": actors,
-        "identity": identity.digest[:12],
-        **settings.model_dump(mode="json"),
-    }
-
-
-def _size(plan: Sequence[Shard]) -> int:
-    return sum(shard.episodes for shard in plan)
-
-
-def _record(dataset: Dataset, episodes: int, counts: CollectionProgress, run: Run) -> None:
+def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
     """Say first how it went: the store may fail."""
+    dataset = plan.dataset
     release(dataset)
     say(
         f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
@@ -142,7 +109,7 @@ def _record(dataset: Dataset, episodes: int, counts: CollectionProgress, run: Ru
     )
     run.metrics(counts.metrics() | review(dataset), step=counts.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
-    left = quarantined_shards(dataset, episodes)
+    left = quarantined_shards(dataset, plan.episodes)
     if left:
         raise UserError(
             f"{len(left)} shards kept failing, {left[0].name} among them; their errors are in "

@@ -1,14 +1,15 @@
-"""The work of a collection: plan the missing shards, submit them to a pool of actors, gather, clean up."""
+"""The work of a collection: submit shards to a pool of actors, gather what they report, clean up."""
 
 import errno
 import sys
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import ray
 
 from cluster.config import CollectSettings
+from cluster.datasets.plan import CollectionPlan, episodes_in
 from cluster.datasets.progress import CollectionProgress, ProgressRecorder
 from cluster.datasets.quarantine import put_aside
 from cluster.datasets.worker import RolloutActor
@@ -17,12 +18,9 @@ from cluster.progress import ProgressLine, say
 from cluster.runtime.actor_pool import Done, Failed, Limits, Pool
 from cluster.tracking import Run
 from workers.collection.shard import ShardReport
-from workers.dataset import shards
-from workers.dataset.folder import Dataset, create
-from workers.dataset.identity import Identity
+from workers.dataset.folder import Dataset
 from workers.dataset.inventory import sweep_digests
-from workers.dataset.shards import Shard
-from workers.dataset.storage.location import Location
+from workers.dataset.shards import Shard, sweep
 from workers.dataset.storage.temporary import wait_for_end
 
 _DISK = {
@@ -37,22 +35,6 @@ LAST_REPORTS = 1024
 """Reports that are kept; a plan is made from fewer."""
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
-
-
-def open_and_plan(identity: Identity, episodes: int, folder: Location) -> tuple[Dataset, list[Shard]]:
-    """The dataset in a folder, begun if need be, and the shards that are missing in it.
-
-    Raises:
-        UserError: the folder holds another dataset, or cannot be written.
-    """
-    try:
-        dataset = create(folder, identity)
-    except (ValueError, OSError) as error:
-        raise UserError(str(error)) from error
-    swept = shards.sweep(folder)
-    if swept:
-        say(f"removed {swept} unfinished files of processes that are gone")
-    return dataset, dataset.missing(episodes)
 
 
 def growth(settings: CollectSettings) -> int:
@@ -83,49 +65,54 @@ def rollout_pool(
     )
 
 
-def work(
-    dataset: Dataset,
-    plan: list[Shard],
-    episodes: int,
+def roll_out(
+    plan: CollectionPlan,
+    shards: Sequence[Shard],
     counts: CollectionProgress,
     run: Run,
     pool: Pool[Shard, ShardReport],
 ) -> list[ShardReport]:
-    """Collect the shards of a plan; returns the reports of the last ones.
+    """Collect some shards of a plan.
+
+    Args:
+        plan: of the collection.
+        shards: of it.
+        counts: what is done so far; they are added to.
+        run: of MLflow, which is told now and then.
+        pool: of actors that roll out.
+
+    Returns:
+        The reports of the last shards, `LAST_REPORTS` at most.
 
     Raises:
         UserError: the disk is full, or no actor can start.
     """
     try:
         with pool:
-            return _gather(pool.run(plan), dataset, episodes, counts, ProgressRecorder(run))
+            return _gather(pool.run(list(shards)), plan, counts, ProgressRecorder(run))
     finally:
-        _clean(dataset, pool.answers)
+        _clean(plan.dataset, pool.answers)
 
 
 def _clean(dataset: Dataset, writers: list[str]) -> None:
     """Leave no unfinished file behind, however the work ended."""
     wait_for_end(writers, _ENDING_SECONDS)
     try:
-        shards.sweep(dataset.folder)
+        sweep(dataset.folder)
         sweep_digests(dataset)
     except OSError as error:  # a store that is away; how the work ended matters more
         say(f"unfinished files may be left in {dataset.folder}, which the next collection removes: {error}")
 
 
 def _gather(
-    outcomes: Iterable[Outcome],
-    dataset: Dataset,
-    episodes: int,
-    counts: CollectionProgress,
-    recorder: ProgressRecorder,
+    outcomes: Iterable[Outcome], plan: CollectionPlan, counts: CollectionProgress, recorder: ProgressRecorder
 ) -> list[ShardReport]:
     reports: deque[ShardReport] = deque(maxlen=LAST_REPORTS)
-    left = sum(shard.episodes for shard in dataset.missing(episodes))
-    with ProgressLine("episodes", episodes, episodes - left) as progress:
+    done = plan.episodes - episodes_in(plan.missing)
+    with ProgressLine("episodes", plan.episodes, done) as progress:
         for outcome in outcomes:
             if isinstance(outcome, Failed):
-                note_failure(outcome, dataset, counts)
+                note_failure(outcome, plan.dataset, counts)
                 continue
             counts.add(outcome.result)
             reports.append(outcome.result)

@@ -2,22 +2,15 @@
 
 import hashlib
 from dataclasses import asdict, dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 from cluster.errors import UserError
 from cluster.hardware.events import canonical
+from cluster.hardware.states import Approval
 
 
 class IdentityMismatch(UserError):  # noqa: N818 - it is an expected refusal, not a defect
     """A folder holds another campaign than the one asked for."""
-
-
-class Approval(StrEnum):
-    """Who lets a checked controller onto the robot."""
-
-    POLICY = "policy"
-    OPERATOR = "operator"
 
 
 @dataclass(frozen=True)

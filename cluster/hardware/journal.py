@@ -22,8 +22,8 @@ from cluster.hardware.events import (
     encode_controller,
     replay,
 )
-from cluster.hardware.identity import Approval, CampaignIdentity
-from cluster.hardware.states import LEGAL, State, is_legal
+from cluster.hardware.identity import CampaignIdentity
+from cluster.hardware.states import LEGAL, Approval, State, is_legal
 
 FILE = "journal.sqlite"
 EVENT_COLUMNS = ", ".join(field.name for field in fields(Event))

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cluster.errors import UsageError
-from cluster.hardware.identity import Approval, CampaignIdentity
+from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.proposals import fingerprint
+from cluster.hardware.states import Approval
 from cluster.optimization import DRAWS
 from svaedc.bo import methods
 from workers.hardware import robots

@@ -45,3 +45,10 @@ TERMINAL = frozenset({State.MEASURED, State.FAILED, State.ABORTED, State.REJECTE
 def is_legal(old: State | None, new: State) -> bool:
     """Whether a trial in `old` (None: it does not exist yet) may become `new`."""
     return new in LEGAL[old]
+
+
+class Approval(StrEnum):
+    """Who lets a checked controller onto the robot."""
+
+    POLICY = "policy"
+    OPERATOR = "operator"

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from cluster.hardware.events import CampaignTrial
-from cluster.hardware.identity import Approval, CampaignIdentity
+from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import Process
-from cluster.hardware.states import TERMINAL, State
+from cluster.hardware.states import TERMINAL, Approval, State
 
 RANDOM_TRIALS = 2
 """Measured before the first suggestion, as in the paper's hardware runs."""

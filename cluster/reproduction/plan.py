@@ -67,6 +67,7 @@ class Reproduction:
         collects: whether they are collected; if not, they were given, or every model was.
         models: folders by latent size.
         trains: latent sizes whose model is trained; the other models were given.
+        results: folder of the figure.
     """
 
     recipe: Recipe
@@ -78,11 +79,7 @@ class Reproduction:
     collects: bool
     models: Mapping[str, Path]
     trains: tuple[str, ...]
-
-    @property
-    def results(self) -> Path:
-        """Folder of the figure."""
-        return self.folder / self.recipe.figure
+    results: Path
 
     def comparison(self, panel: Panel) -> Path:
         """Folder of a panel's comparison."""
@@ -162,6 +159,7 @@ def resolve(
         collects=bool(trains) and dataset is None,
         models={**given, **own},
         trains=trains,
+        results=folder / recipe.figure,
     )
 
 

@@ -1,9 +1,14 @@
-"""`svaedc reproduce`: collect, train and compare as a recipe says, then hold results against the paper."""
+"""Runs a recipe: collect, train and compare as it says; and for a figure, hold the results against the paper."""
 
-from cluster.comparison.compare import compare
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from cluster.comparison.compare import Comparison, compare
 from cluster.comparison.plan import Grid, plan_comparison
 from cluster.config import Settings
 from cluster.datasets.collect import collect
+from cluster.datasets.plan import plan_collection
 from cluster.progress import say, timing
 from cluster.reproduction.cost import bill, lines
 from cluster.reproduction.experiment import Panel
@@ -14,92 +19,146 @@ from cluster.runtime.session import Session
 from cluster.tracking import Tracker
 from cluster.training.launch import placement_of
 from cluster.training.train import train
-from svaedc.analysis.summary import Summary
 from workers import setups
+
+OWN_NAMES: Mapping[str, str] = MappingProxyType({})
+"""Steps are called by what they do, unless another name is given."""
 
 
 def reproduce(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> Table:
-    """Do what is missing of a reproduction; the same call goes on after an interruption.
+    """Do what is missing of a figure; the same call goes on after an interruption.
+
+    Args:
+        reproduction: what to do.
+        settings: of all steps.
+        session: where they run.
+        tracker: that records them.
+
+    Returns:
+        The claims of the paper beside what was measured.
 
     Raises:
         UserError: as `collect`, `train` and `compare` do; the cluster is checked for all of them first.
     """
-    _preflight(reproduction, settings, session)
-    foretell(reproduction, settings, session.cpus)
-    _collect(reproduction, settings, session, tracker)
-    for latent in reproduction.trains:
-        _train(reproduction, latent, settings, session, tracker)
-    summaries = {
-        panel.name: _compare(reproduction, panel, settings, session, tracker)
-        for panel in reproduction.recipe.panels
-    }
-    found = table(reproduction.recipe, summaries, settings.compare.initial_trials)
-    for path in publish(reproduction, found):
+    preflight(reproduction, settings, session)
+    say_cost(reproduction, settings, session.cpus)
+    found = run_steps(reproduction, settings, session, tracker)
+    summaries = {name: comparison.summary for name, comparison in found.items()}
+    claims = table(reproduction.recipe, summaries, settings.compare.initial_trials)
+    for path in publish(reproduction, claims):
         say(f"wrote {path}")
-    for line in found.lines():
+    for line in claims.lines():
         say(line)
-    return found
+    return claims
 
 
-def foretell(reproduction: Reproduction, settings: Settings, count: int) -> None:
-    """Say what is still to do of a reproduction, and what that costs on so many cores; starts nothing."""
+def say_cost(reproduction: Reproduction, settings: Settings, count: int) -> None:
+    """Say what is still to do of a figure, and what that costs; starts nothing.
+
+    Args:
+        reproduction: what to do.
+        settings: of all steps.
+        count: cores that do it.
+    """
     recipe = reproduction.recipe
     say(f"{recipe.figure}: {recipe.label}, {reproduction.runs} runs of each method, in {reproduction.folder}")
     for line in lines(reproduction, bill(reproduction, settings, count), count):
         say(line)
 
 
-def _preflight(reproduction: Reproduction, settings: Settings, session: Session) -> None:
-    """Refuse now what a later step would refuse after hours of work."""
-    session.preflight(settings.compare.slots)
-    if reproduction.collects:
-        session.preflight(settings.collect.actor_count(session.cpus))
+def preflight(reproduction: Reproduction, settings: Settings, session: Session) -> None:
+    """Refuse now what a later step would refuse after hours of work.
+
+    Args:
+        reproduction: what to do.
+        settings: of all steps.
+        session: where they run.
+
+    Raises:
+        UserError: the cluster has no room for one of them.
+    """
+    missing = reproduction.missing_episodes()
+    if missing:
+        shards = math.ceil(missing / settings.collect.episodes_per_shard)
+        session.preflight(min(settings.collect.actor_count(session.cpus), shards))
     if not all(map(reproduction.is_trained, reproduction.trains)):
         placement_of(settings.train, free_machines(session))
+    session.preflight(settings.compare.slots)
+
+
+def run_steps(
+    reproduction: Reproduction,
+    settings: Settings,
+    session: Session,
+    tracker: Tracker,
+    names: Mapping[str, str] = OWN_NAMES,
+) -> dict[str, Comparison]:
+    """Collect, train and compare what a recipe asks for and is missing.
+
+    Args:
+        reproduction: what to do.
+        settings: of all steps.
+        session: where they run.
+        tracker: that records them.
+        names: what a person reads of `collect`, `train` and `compare`, where it is not the step's own name.
+
+    Returns:
+        The comparison of each panel, by its name.
+
+    Raises:
+        UserError: as `collect`, `train` and `compare` do.
+    """
+    recipe = reproduction.recipe
+    if reproduction.missing_episodes():
+        with timing(names.get("collect", f"collect {recipe.data}")):
+            _collect(reproduction, settings, session, tracker)
+    for latent in reproduction.trains:
+        with timing(names.get("train", f"train {latent}")):
+            _train(reproduction, latent, settings, session, tracker)
+    found = {}
+    for panel in recipe.panels:
+        with timing(names.get("compare", f"compare {panel.name}")):
+            found[panel.name] = _compare(reproduction, panel, settings, session, tracker)
+    return found
 
 
 def _collect(reproduction: Reproduction, settings: Settings, session: Session, tracker: Tracker) -> None:
-    if not reproduction.missing_episodes():
-        return
-    with timing(f"collect {reproduction.recipe.data}"):
-        collect(
-            setup=setups.load(reproduction.recipe.data),
-            episodes=reproduction.episodes,
-            folder=reproduction.dataset,
-            seed=0,
-            settings=settings.collect,
-            session=session,
-            tracker=tracker,
-        )
+    plan = plan_collection(
+        setup=setups.load(reproduction.recipe.data),
+        episodes=reproduction.episodes,
+        folder=reproduction.dataset,
+        seed=0,
+        settings=settings.collect,
+    )
+    collect(plan, settings.collect, session, tracker)
 
 
 def _train(
     reproduction: Reproduction, latent: str, settings: Settings, session: Session, tracker: Tracker
 ) -> None:
-    with timing(f"train {latent}"):
-        train(
-            folder=reproduction.dataset,
-            model=reproduction.models[latent],
-            preset=reproduction.scale.preset,
-            seed=0,
-            settings=reproduction.training(settings.train, latent),
-            session=session,
-            tracker=tracker,
-        )
+    train(
+        folder=reproduction.dataset,
+        model=reproduction.models[latent],
+        preset=reproduction.scale.preset,
+        seed=0,
+        settings=reproduction.training(settings.train, latent),
+        session=session,
+        tracker=tracker,
+    )
 
 
 def _compare(
     reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
-) -> Summary:
-    with timing(f"compare {panel.name}"):
-        plan = plan_comparison(
-            setup=setups.load(panel.setup),
-            grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
-            trials=panel.trials,
-            gap=panel.gap,
-            model=reproduction.models[panel.latent] if panel.latent else None,
-            folder=reproduction.comparison(panel),
-            settings=settings.compare,
-            caption=f"{reproduction.recipe.figure}, {panel.name}: {panel.title}",
-        )
-        return compare(plan, session, tracker).summary
+) -> Comparison:
+    recipe = reproduction.recipe
+    plan = plan_comparison(
+        setup=setups.load(panel.setup),
+        grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
+        trials=panel.trials,
+        gap=panel.gap,
+        model=reproduction.models[panel.latent] if panel.latent else None,
+        folder=reproduction.comparison(panel),
+        settings=settings.compare,
+        caption=f"{recipe.figure}, {panel.name}: {panel.title}" if recipe.figure else "",
+    )
+    return compare(plan, session, tracker)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cluster.hardware.database import JournalError
-from cluster.hardware.identity import Approval, CampaignIdentity
-from cluster.hardware.states import ACTIVE, TERMINAL, State
+from cluster.hardware.identity import CampaignIdentity
+from cluster.hardware.states import ACTIVE, TERMINAL, Approval, State
 from tests.cluster.hardware.desk import carry_out, starts
 from tests.cluster.hardware.test_kills import SIGKILLED, journal_of, resolve
 

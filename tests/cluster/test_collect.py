@@ -21,6 +21,7 @@ from cluster.cli.dataset import info
 from cluster.config import CollectSettings
 from cluster.datasets.collect import collect
 from cluster.datasets.gather import note_failure, rollout_pool
+from cluster.datasets.plan import plan_collection
 from cluster.datasets.progress import CollectionProgress, ProgressRecorder
 from cluster.datasets.quarantine import put_aside, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
@@ -41,13 +42,12 @@ SETTINGS = CollectSettings(actors=2, episodes_per_shard=8)
 
 def collected(folder: Path, episodes: int, session, tracking_settings, seed: int = 3):
     return collect(
-        setup=setups.load("franka"),
-        episodes=episodes,
-        folder=folder,
-        seed=seed,
-        settings=SETTINGS,
-        session=session,
-        tracker=open_tracker(tracking_settings),
+        plan_collection(
+            setup=setups.load("franka"), episodes=episodes, folder=folder, seed=seed, settings=SETTINGS
+        ),
+        SETTINGS,
+        session,
+        open_tracker(tracking_settings),
     )
 
 
@@ -135,13 +135,16 @@ def test_a_folder_of_another_dataset_is_refused_naming_the_field(ray_session, tr
 def test_more_actors_than_cpus_are_refused_before_anything_starts(ray_session, tracking_settings, tmp_path):
     with pytest.raises(UserError, match="needs 9 CPUs"):
         collect(
-            setup=setups.load("franka"),
-            episodes=90,
-            folder=tmp_path / "dataset",
-            seed=0,
-            settings=CollectSettings(actors=9, episodes_per_shard=8),
-            session=ray_session,
-            tracker=open_tracker(tracking_settings),
+            plan_collection(
+                setup=setups.load("franka"),
+                episodes=90,
+                folder=tmp_path / "dataset",
+                seed=0,
+                settings=CollectSettings(actors=9, episodes_per_shard=8),
+            ),
+            CollectSettings(actors=9, episodes_per_shard=8),
+            ray_session,
+            open_tracker(tracking_settings),
         )
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from cluster.config import CollectSettings
-from cluster.datasets.collect import collect, foretell
+from cluster.datasets.collect import collect, collect_pilot
 from cluster.datasets.pilot import PLAN, add_cost, begin, review
+from cluster.datasets.plan import plan_collection
 from cluster.datasets.progress import CollectionProgress
 from cluster.errors import UserError
 from cluster.tracking import open_tracker
@@ -20,16 +21,10 @@ from workers.dataset.storage.temporary import WRITING
 SETTINGS = CollectSettings(actors=2, episodes_per_shard=2)
 
 
-def job(folder: Path, episodes: int, session, tracker) -> dict:
-    return {
-        "setup": setups.load("franka"),
-        "episodes": episodes,
-        "folder": folder,
-        "seed": 0,
-        "settings": SETTINGS,
-        "session": session,
-        "tracker": tracker,
-    }
+def job(folder: Path, episodes: int, session, tracker) -> tuple:
+    setup = setups.load("franka")
+    plan = plan_collection(setup=setup, episodes=episodes, folder=folder, seed=0, settings=SETTINGS)
+    return plan, SETTINGS, session, tracker
 
 
 @pytest.fixture
@@ -61,13 +56,13 @@ def test_a_pilot_is_the_beginning_of_the_dataset_and_is_judged_at_its_end(
     ray_session, tracking_settings, tmp_path, capsys
 ):
     folder, tracker = tmp_path / "dataset", open_tracker(tracking_settings)
-    foretell(**job(folder, 12, ray_session, tracker))
+    collect_pilot(*job(folder, 12, ray_session, tracker))
     said = capsys.readouterr().err
     assert "the whole job of 12 episodes on 2 actors, from its first 8" in said
     assert all(f"  {name} " in said for name in ("core-hours", "wall time", "disk", "badness"))
     pilot = {path: path.stat().st_ino for path in folder.glob("*.parquet")}
     assert len(pilot) == 4
-    dataset = collect(**job(folder, 12, ray_session, tracker))
+    dataset = collect(*job(folder, 12, ray_session, tracker))
     assert dataset.episodes() == 12
     assert all(path.stat().st_ino == number for path, number in pilot.items())
     said = capsys.readouterr().err
@@ -119,4 +114,4 @@ def test_a_plan_that_nobody_can_read_changes_nothing(dataset, content):
 
 def test_too_little_to_plan_for_is_refused(ray_session, tracking_settings, tmp_path):
     with pytest.raises(UserError, match=r"2 episodes are left to collect in .*: too few to plan for"):
-        foretell(**job(tmp_path / "dataset", 2, ray_session, open_tracker(tracking_settings)))
+        collect_pilot(*job(tmp_path / "dataset", 2, ray_session, open_tracker(tracking_settings)))

@@ -11,8 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from cluster.cli.main import app
-from cluster.datasets.gather import open_and_plan
+from cluster.config import CollectSettings
 from cluster.datasets.pilot import add_cost
+from cluster.datasets.plan import plan_collection
 from cluster.datasets.progress import CollectionProgress
 from cluster.datasets.quarantine import put_aside, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
@@ -125,7 +126,13 @@ def test_a_store_that_cannot_be_used_is_told_with_the_remedy(where, free_port, r
     }
     address, message = wrong[where]
     with pytest.raises(UserError, match=message):
-        open_and_plan(remote.identity, 8, dataset_location(address))
+        plan_collection(
+            setup=setups.load(SETUP),
+            episodes=8,
+            folder=dataset_location(address),
+            seed=remote.identity.seed,
+            settings=CollectSettings(episodes_per_shard=remote.identity.episodes_per_shard),
+        )
 
 
 def command(*arguments: str, root: Path) -> list[str]:

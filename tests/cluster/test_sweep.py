@@ -7,6 +7,7 @@ import pytest
 
 from cluster.config import CollectSettings, TrainSettings
 from cluster.datasets.collect import collect
+from cluster.datasets.plan import plan_collection
 from cluster.errors import UsageError, UserError
 from cluster.files import write_json
 from cluster.runtime.session import Session
@@ -126,14 +127,17 @@ def test_a_sweep_trains_measures_and_ranks_its_models_and_repeats_none(
 ):
     tracker = open_tracker(tracking_settings)
     collect(
-        setup=setups.load("franka"),
-        episodes=520,
-        folder=tmp_path / "dataset",
-        seed=0,
-        repeats=1,
-        settings=CollectSettings(actors=2, episodes_per_shard=130),
-        session=ray_session,
-        tracker=tracker,
+        plan_collection(
+            setup=setups.load("franka"),
+            episodes=520,
+            folder=tmp_path / "dataset",
+            seed=0,
+            repeats=1,
+            settings=CollectSettings(actors=2, episodes_per_shard=130),
+        ),
+        CollectSettings(actors=2, episodes_per_shard=130),
+        ray_session,
+        tracker,
     )
 
     def run(**more):

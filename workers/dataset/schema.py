@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from jaxtyping import Float32, Float64, Int64, UInt8
 
@@ -213,7 +212,7 @@ def read(path: Location, identity: Identity) -> Columns:
         y=table["y"].to_numpy(),
         f=table["f"].to_numpy(),
         stop=tuple(table["stop"].to_pylist()),
-        physics={name: pc.struct_field(table["physics"], name).to_numpy() for name in identity.physics},
+        physics={name: column.to_numpy() for name, column in _fields(table["physics"])},
     )
 
 
@@ -274,4 +273,11 @@ def _name_damage(path: Location) -> Iterator[None]:
 
 
 def _dense(column: pa.ChunkedArray, shape: tuple[int, ...]) -> Any:
-    return pc.list_flatten(column).to_numpy().reshape(len(column), *shape)
+    values = pa.chunked_array([chunk.flatten() for chunk in column.chunks], column.type.value_type)
+    return values.to_numpy().reshape(len(column), *shape)
+
+
+def _fields(column: pa.ChunkedArray) -> Iterator[tuple[str, pa.ChunkedArray]]:
+    """The numbers of a struct by name; what `pyarrow.compute` does as well takes long to import."""
+    names = [column.type.field(index).name for index in range(column.type.num_fields)]
+    return zip(names, column.flatten(), strict=True)

@@ -1,15 +1,18 @@
 """Setups by name: those that ship, and modules of a user's own."""
 
+import difflib
 import hashlib
 import inspect
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from workers.setups.setup import Setup, require_known
+if TYPE_CHECKING:
+    from workers.setups.setup import Setup
 
 SETUPS = {
     "franka": "workers.setups.franka:franka",
@@ -26,7 +29,7 @@ SETUPS = {
 and one line here for each of its variants. A module of the user's own needs no line, and offers `setup()`."""
 
 
-def load(name: str) -> Setup:
+def load(name: str) -> "Setup":
     """The setup of that name, or of the importable module of that name, which offers `setup()`.
 
     Raises:
@@ -35,6 +38,8 @@ def load(name: str) -> Setup:
     if name in SETUPS or not _is_module(name):
         module, _, function = SETUPS[_shipped_name(name)].partition(":")
         return getattr(import_module(module), function)()
+    from workers.setups.setup import Setup
+
     made = getattr(import_user_module(name), "setup", lambda: None)()
     if not isinstance(made, Setup):
         raise LookupError(
@@ -69,3 +74,24 @@ def file_digest(part: object) -> str:
 def _is_module(name: str) -> bool:
     parts = name.split(".")
     return all(part.isidentifier() for part in parts) and (len(parts) > 1 or find_spec(name) is not None)
+
+
+def require_known(name: str, kind: str, names: Mapping[str, object]) -> str:
+    """Refuse a name that is not one of the names.
+
+    Args:
+        name: what was asked for.
+        kind: of thing that it names, for the error.
+        names: that are known, as keys.
+
+    Returns:
+        The name itself.
+
+    Raises:
+        LookupError: it is none of them; the message suggests the nearest.
+    """
+    if name in names:
+        return name
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    raise LookupError(f"unknown {kind} {name!r}; {hint}known: {', '.join(names)}")

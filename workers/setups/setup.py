@@ -1,6 +1,5 @@
 """What a setup is: an environment, a controller and a task that belong together."""
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,6 +7,7 @@ from dataclasses import dataclass
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges, ranges
+from workers.setups.registry import require_known
 from workers.tasks.stop import STOPPED, StopRule, never
 from workers.tasks.task import BITS, Task
 
@@ -102,24 +102,3 @@ class Setup:
         for name in written:
             require_known(name, "physics parameter", fixed)
         return PhysicsRanges({**fixed, **written})
-
-
-def require_known(name: str, kind: str, names: Mapping[str, object]) -> str:
-    """Refuse a name that is not one of the names.
-
-    Args:
-        name: what was asked for.
-        kind: of thing that it names, for the error.
-        names: that are known, as keys.
-
-    Returns:
-        The name itself.
-
-    Raises:
-        LookupError: it is none of them; the message suggests the nearest.
-    """
-    if name in names:
-        return name
-    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
-    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
-    raise LookupError(f"unknown {kind} {name!r}; {hint}known: {', '.join(names)}")

@@ -17,9 +17,10 @@ import numpy as np
 
 from cluster.hardware import campaign, journal
 from cluster.hardware.campaign import Campaign
-from cluster.hardware.identity import Approval, CampaignIdentity
+from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
+from cluster.hardware.states import Approval
 from cluster.hardware.status import Phase
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from cluster.hardware import campaign, journal
-from cluster.hardware.identity import Approval
-from cluster.hardware.states import State
+from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase, measured_trials, phase_of, planned_trials
 from tests.cluster.hardware.desk import (
     DIMENSIONS,

@@ -17,9 +17,8 @@ from cluster.errors import UserError
 from cluster.hardware import connect, lock, operator
 from cluster.hardware.actor import HardwareActor, actor_options
 from cluster.hardware.driver import start
-from cluster.hardware.identity import Approval
 from cluster.hardware.plan import CampaignPlan, identify
-from cluster.hardware.states import State
+from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
@@ -239,7 +238,7 @@ import sys
 from pathlib import Path
 from cluster.config import HardwareSettings, RaySettings, TrackingSettings
 from cluster.hardware.driver import start
-from cluster.hardware.identity import Approval
+from cluster.hardware.states import Approval
 from cluster.hardware.plan import CampaignPlan, identify
 from cluster.runtime.session import connect
 from cluster.tracking import open_tracker

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cluster.hardware import campaign, journal
-from cluster.hardware.identity import Approval, CampaignIdentity
+from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import RobotTaken
-from cluster.hardware.states import State
+from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import carry_out, objective, opened, starts
 from workers.hardware.ledger import MotionLedger

@@ -10,10 +10,9 @@ import pytest
 
 from cluster.errors import UsageError
 from cluster.hardware import campaign, journal, operator
-from cluster.hardware.identity import Approval
 from cluster.hardware.journal import IllegalTransition
 from cluster.hardware.lock import FolderLock, FolderTaken, Process
-from cluster.hardware.states import State
+from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
 
