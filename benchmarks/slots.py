@@ -18,6 +18,7 @@ from typing import Any
 
 import torch
 
+from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.tune import BestSoFar, Watch, submit
 from cluster.comparison.worker import ComparisonJob
@@ -129,7 +130,13 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as name:
                 (Path(name) / "runs").mkdir()
                 job = ComparisonJob(
-                    Path(name), arguments.setup, "paper", "", pool_size=5000, initial=2, trials=20
+                    ComparisonFolder(Path(name)),
+                    arguments.setup,
+                    "paper",
+                    "",
+                    pool_size=5000,
+                    initial=2,
+                    trials=20,
                 )
                 rate = measured(job, keys)
             rates[way].append(rate)

@@ -15,7 +15,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from cluster.comparison.records import RunKey, read_trials, rows
+from cluster.comparison.folder import ComparisonFolder
+from cluster.comparison.records import RunKey, rows
 from cluster.comparison.worker import ComparisonJob
 from studies.cells import Result, Study, arguments, results, table, written
 from studies.training import Source, begun, halves, measures, preset_for, train
@@ -119,18 +120,18 @@ def compute(source: Source, out: Path, cell: Cell) -> Result:
 def gains(cell: Cell, setup_name: str, model: Path, out: Path) -> dict[str, float]:
     """Mean and interval of the paired difference after some trials; every trial is on disk at once."""
     setup, random = setups.load(setup_name), replace(cell, count=0, kl=0.0, bad=SAME, pool=0, updates=0)
-    kept = []
+    kept = {}
     with setup.open() as environment:
         # What `random` does depends on no model and no pool: its runs are shared.
         for method, of in (("random", random), ("svae-dc", cell)):
-            folder = out / "runs" / _digest(tuple(asdict(replace(of, runs=0)).values()))
-            (folder / "runs").mkdir(parents=True, exist_ok=True)
+            folder = ComparisonFolder(out / "runs" / _digest(tuple(asdict(replace(of, runs=0)).values())))
+            (folder.path / "runs").mkdir(parents=True, exist_ok=True)
             job = ComparisonJob(folder, setup.name, cell.gap, str(model), cell.pool, INITIAL, TRIALS)
             for seed in range(FIRST_TUNING, FIRST_TUNING + cell.runs):
                 key = RunKey(method, seed)
                 for _ in job.run(key, setup, environment):
                     pass
-                kept.append((key, read_trials(key.path(folder))))
+                kept[key] = folder.trials(key)
     summary = summarize(rows(kept), Reporting(INITIAL), np.random.default_rng(0))
     [gain] = [each for each in summary.differences if each.method == "svae-dc"]
     return {f"{part} {n}": getattr(gain.best[INITIAL + n - 1], part) for n in AFTER for part in PARTS}

@@ -7,7 +7,7 @@ import numpy as np
 
 
 class Stream(StrEnum):
-    """What is drawn. Streams are independent of each other; a name decides what is drawn, and never changes."""
+    """What is drawn. Streams are independent of each other; their names decide the draws and never change."""
 
     CONTROLLER = "controller"
     """The x of an episode of a dataset; the index is that of the controller."""

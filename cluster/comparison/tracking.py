@@ -4,17 +4,19 @@ import json
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.report import Report
-from cluster.errors import UserError
-from cluster.progress import say
 from cluster.tracking import Run, Tracker
+from cluster.tracking.recorder import Recorder
 from svaedc.bo.loop import Trial
 
 NOTE = "mlflow.json"
+CONSEQUENCE = ". The comparison goes on; what MLflow lacks is recorded at its end"
+"""What a person reads when the store fails meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -64,22 +66,18 @@ class TrackedComparison:
     def __init__(self, folder: ComparisonFolder, note: Note, run: Run) -> None:
         self._folder = folder
         self._note = note
-        self._failed = False
+        self._recorder = Recorder(CONSEQUENCE)
         self.run = run
         self._save()
 
     def try_child(self, key: RunKey, trials: list[Trial]) -> None:
-        """Record a run that has just ended; a store that fails stops no comparison.
+        """Record a run that has just ended, now or later; a store that fails stops no comparison.
 
-        It is then left alone until the end: MLflow tries a server that is away for minutes each time.
+        Args:
+            key: of the run.
+            trials: all of its trials.
         """
-        if self._failed:
-            return
-        try:
-            self.child(key, trials)
-        except UserError as error:
-            self._failed = True
-            say(f"{error}. The comparison goes on; what MLflow lacks is recorded at its end")
+        self._recorder.record(partial(self.child, key, trials))
 
     def child(self, key: RunKey, trials: list[Trial]) -> None:
         """Record a run, unless MLflow has it.

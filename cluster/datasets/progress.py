@@ -4,10 +4,10 @@ import math
 import time
 from collections import defaultdict, deque
 from dataclasses import dataclass, field
+from functools import partial
 
-from cluster.errors import UserError
-from cluster.progress import say
 from cluster.tracking import Run
+from cluster.tracking.recorder import Recorder
 from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
 
@@ -56,6 +56,8 @@ class Rates:
 
 
 RECORD_SECONDS = 30.0
+CONSEQUENCE = "; the collection goes on, and its numbers are recorded at the end at the latest"
+"""What a person reads when the store fails meanwhile."""
 """Between two records: each is a few tens of milliseconds in which the driver does nothing else."""
 
 
@@ -133,33 +135,22 @@ class CollectionProgress:
         return {name: float(value) for name, value in values.items()}
 
 
-@dataclass
 class ProgressRecorder:
-    """Records a counts now and then; a store that fails meanwhile must not end hours of work.
+    """Records counts now and then; a store that fails meanwhile must not end hours of work.
 
-    Attributes:
+    Args:
         run: the MLflow run.
-        interval: seconds between records; doubled by every failure, for each may last minutes.
+        interval: seconds between records.
     """
 
-    run: Run
-    interval: float = RECORD_SECONDS
-    _due: float = field(init=False)
-    _has_failed: bool = field(init=False, default=False)
-
-    def __post_init__(self) -> None:
-        """Begin the first interval."""
-        self._due = time.monotonic() + self.interval
+    def __init__(self, run: Run, interval: float = RECORD_SECONDS) -> None:
+        self._run, self._interval = run, interval
+        self._recorder = Recorder(CONSEQUENCE, interval)
+        self._due = time.monotonic() + interval
 
     def record(self, counts: CollectionProgress) -> None:
-        """Record the counts if its time has come; the first failure is said."""
+        """Record the counts if their time has come."""
         if time.monotonic() < self._due:
             return
-        try:
-            self.run.metrics(counts.metrics(), step=counts.episodes)
-        except UserError as error:
-            self.interval *= 2
-            if not self._has_failed:
-                say(f"{error}; the collection goes on, and its numbers are recorded at the end at the latest")
-            self._has_failed = True
-        self._due = time.monotonic() + self.interval
+        self._recorder.record(partial(self._run.metrics, counts.metrics(), step=counts.episodes))
+        self._due = time.monotonic() + self._interval

@@ -1,4 +1,4 @@
-"""Runs a recipe: collect, train and compare as it says; and for a figure, hold the results against the paper."""
+"""Runs a recipe: collect, train and compare as it says, and hold a figure's results against the paper."""
 
 import math
 from collections.abc import Mapping

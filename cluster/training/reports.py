@@ -1,16 +1,14 @@
 """What training processes report of their epochs, for the person who watches and for the MLflow run."""
 
-import math
-import time
-from collections import deque
+from functools import partial
 from typing import Any
 
-from cluster.errors import UserError
 from cluster.progress import ProgressLine, say
 from cluster.tracking import Run
+from cluster.tracking.recorder import PAUSE_SECONDS, Recorder
 
-PAUSE_SECONDS = 30.0
-"""Half of the pause after the store's first failure: one request to a dead server lasts minutes."""
+CONSEQUENCE = ". Training goes on; its curves are completed when the store is back"
+"""What a person reads when the store fails meanwhile."""
 
 
 class Reports:
@@ -19,29 +17,17 @@ class Reports:
     Args:
         progress: where updates are shown.
         run: the MLflow run.
-        pause: seconds; every failure of the store doubles them, and it is left alone for that long.
+        pause: seconds; see `Recorder`.
     """
 
     def __init__(self, progress: ProgressLine, run: Run, pause: float = PAUSE_SECONDS) -> None:
-        self._progress, self._run, self._pause = progress, run, pause
-        self._unrecorded: deque[dict[str, Any]] = deque()
-        self._due = -math.inf
-        self._has_failed = False
+        self._progress, self._run = progress, run
+        self._recorder = Recorder(CONSEQUENCE, pause)
 
     def receive(self, report: dict[str, Any]) -> None:
-        """Show a report and record all that are not yet recorded; a failure is said once and ends nothing."""
+        """Show a report, and record all that are not yet recorded; a failing store ends nothing."""
         self._show(report)
-        self._unrecorded.append(report)
-        if time.monotonic() < self._due:
-            return
-        try:
-            self.complete()
-        except UserError as error:
-            if not self._has_failed:
-                say(f"{error}. Training goes on; its curves are completed when the store is back")
-            self._has_failed = True
-            self._pause *= 2
-            self._due = time.monotonic() + self._pause
+        self._recorder.record(partial(self._record, report))
 
     def complete(self) -> None:
         """Record what is not yet recorded, in its order.
@@ -49,14 +35,11 @@ class Reports:
         Raises:
             UserError: the store still fails.
         """
-        while self._unrecorded:
-            self._record(self._unrecorded[0])
-            self._unrecorded.popleft()
+        self._recorder.complete()
 
     def give_up(self) -> None:
         """Leave a store that has failed alone from now on: who has pressed Ctrl-C does not wait for it."""
-        if self._has_failed:
-            self._due = math.inf
+        self._recorder.give_up()
 
     def _show(self, report: dict[str, Any]) -> None:
         if "device" in report:

@@ -21,9 +21,9 @@ from matplotlib.markers import MarkerStyle
 
 from cluster.comparison import figure
 from cluster.comparison.compare import compare
-from cluster.comparison.folder import alone_in, claim
+from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.plan import Grid, plan_comparison, usable
-from cluster.comparison.records import RunKey, all_runs, append, read_trials, seeds_in
+from cluster.comparison.records import RunKey, append, read_trials
 from cluster.comparison.tracking import begin
 from cluster.comparison.tune import BestSoFar
 from cluster.comparison.worker import evaluation
@@ -249,7 +249,7 @@ def test_runs_without_their_identity_are_refused(compared, tmp_path):
 
 def test_two_comparisons_at_once_in_one_folder_are_refused(compared, tmp_path):
     with (
-        alone_in(tmp_path / "out"),
+        ComparisonFolder(tmp_path / "out").alone(),
         pytest.raises(UserError, match=r"another comparison is at work in .*/out; wait for its end"),
     ):
         compared("random")
@@ -380,10 +380,10 @@ def test_runs_of_a_setup_whose_code_has_changed_are_not_mixed(tmp_path):
         for each in (setup, replace(setup, code="2" * 64))
     ]
     (tmp_path / "runs").mkdir()
-    claim(tmp_path, plans[0].identity, "")
-    claim(tmp_path, plans[0].identity, "")
+    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
+    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
     with pytest.raises(UserError, match=r"with setup_digest '1111.*, not '2222"):
-        claim(tmp_path, plans[1].identity, "")
+        ComparisonFolder(tmp_path).claim(plans[1].identity, "")
 
 
 def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):
@@ -478,7 +478,7 @@ def test_a_store_that_failed_once_is_left_alone_until_the_end(tmp_path, capsys):
     # One whose server accepts and stays silent would cost minutes for every run.
     store = TrackingSettings(uri=f"sqlite:///{tmp_path / 'mlflow.db'}", experiment="tests")
     (tmp_path / "out").mkdir()
-    tracked = begin(tmp_path / "out", open_tracker(store), "compare", {})
+    tracked = begin(ComparisonFolder(tmp_path / "out"), open_tracker(store), "compare", {})
     (tmp_path / "mlflow.db").unlink()
     (tmp_path / "mlflow.db").mkdir()
     for seed in (1000, 1001):
@@ -503,8 +503,7 @@ def test_a_copy_among_the_records_is_no_run(tmp_path):
     (tmp_path / "runs").mkdir()
     append(RunKey("svae-dc", 3).path(tmp_path), trial(0))
     shutil.copy(RunKey("svae-dc", 3).path(tmp_path), tmp_path / "runs" / "svae-dc-00003 (copy).jsonl")
-    assert [key for key, _ in all_runs(tmp_path)] == [RunKey("svae-dc", 3)]
-    assert seeds_in(tmp_path) == {3}
+    assert ComparisonFolder(tmp_path).begun_keys() == [RunKey("svae-dc", 3)]
 
 
 @pytest.mark.slow

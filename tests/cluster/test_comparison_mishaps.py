@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import pyarrow.parquet as pq
 import pytest
 
-from cluster.comparison.records import RunKey, all_runs
+from cluster.comparison.folder import ComparisonFolder
+from cluster.comparison.records import RunKey
 from cluster.comparison.report import lines, publish, summary_of
 from cluster.comparison.worker import ComparisonJob
 from workers import setups
@@ -29,7 +30,7 @@ KEYS = [RunKey(method, run) for run in (1000, 1001) for method in ("random", "se
 
 def job_in(folder) -> ComparisonJob:
     (folder / "runs").mkdir(parents=True)
-    return ComparisonJob(folder, SETUP.name, "paper", "", pool_size=60, initial=2, trials=6)
+    return ComparisonJob(ComparisonFolder(folder), SETUP.name, "paper", "", pool_size=60, initial=2, trials=6)
 
 
 def run(job: ComparisonJob, key: RunKey) -> None:
@@ -48,7 +49,7 @@ def job(tmp_path_factory) -> ComparisonJob:
 
 
 def test_a_trial_without_an_objective_is_marked_counts_for_nothing_and_is_not_tried_again(job):
-    for _, trials in all_runs(job.folder):
+    for trials in job.folder.runs().values():
         assert len(trials) == 8
         for trial in trials:
             is_failed = bool(trial.x[5] > 2 / 3)
@@ -56,38 +57,40 @@ def test_a_trial_without_an_objective_is_marked_counts_for_nothing_and_is_not_tr
         measured = [trial.f for trial in trials if trial.status == "ok"]
         assert trials[-1].best == max(measured)
         assert len({trial.x.tobytes() for trial in trials}) == 8
-    assert any(trial.status == "failed" for key, trials in all_runs(job.folder) for trial in trials)
+    assert any(trial.status == "failed" for key, trials in job.folder.runs().items() for trial in trials)
 
 
 def test_a_run_goes_on_after_a_trial_without_an_objective_as_if_it_had_not_stopped(job, tmp_path):
     key = next(
-        key for key, trials in all_runs(job.folder) if "failed" in [trial.status for trial in trials[:7]]
+        key for key, trials in job.folder.runs().items() if "failed" in [trial.status for trial in trials[:7]]
     )
     again = job_in(tmp_path / "again")
-    whole = key.path(job.folder).read_bytes().splitlines(keepends=True)
-    key.path(again.folder).write_bytes(b"".join(whole[:7]))
+    whole = key.path(job.folder.path).read_bytes().splitlines(keepends=True)
+    key.path(again.folder.path).write_bytes(b"".join(whole[:7]))
     run(again, key)
-    [(_, trials)] = all_runs(again.folder)
+    [trials] = again.folder.runs().values()
     assert [trial.x.tobytes() for trial in trials] == [
-        trial.x.tobytes() for other, found in all_runs(job.folder) if other == key for trial in found
+        trial.x.tobytes() for other, found in job.folder.runs().items() if other == key for trial in found
     ]
 
 
 def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(job):
-    runs = list(all_runs(job.folder))
+    runs = job.folder.runs()
     summary = summary_of(job, SETUP, runs)
     publish(job, SETUP, runs, summary, {})
-    page = (job.folder / "report.html").read_text()
+    page = (job.folder.path / "report.html").read_text()
     assert "Some trials gave no objective. They teach no method anything" in page
     assert "Nobody reached the threshold of success" in page
     assert "not reached (0 of 2 runs)" in page
-    written = (job.folder / "summary.json").read_text()
+    written = (job.folder.path / "summary.json").read_text()
     found = json.loads(written, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert found["title"] == "quadratic-30d-intrinsic-3: Bayesian optimisation"  # a formula hides no physics
     assert all(method["successful_runs"]["mean"] == 0 for method in found["methods"].values())
-    failed = [trial.status for _, trials in runs for trial in trials if trial.index >= 2].count("failed")
+    failed = [trial.status for trials in runs.values() for trial in trials if trial.index >= 2].count(
+        "failed"
+    )
     shares = [method["failed_trials"]["mean"] for method in found["methods"].values()]
     assert sum(shares) * 12 == pytest.approx(failed)
-    table = pq.read_table(job.folder / "trials.parquet").to_pylist()
+    table = pq.read_table(job.folder.path / "trials.parquet").to_pylist()
     assert {row["status"] for row in table if math.isnan(row["f"])} == {"failed"}
     assert all("best after 8 trials" in line for line in lines(summary))
