@@ -36,10 +36,8 @@ def proportion(hits: Bool[np.ndarray, " runs"], confidence: float) -> Estimate:
     n, k = len(hits), int(hits.sum())
     if not n:
         return Estimate(math.nan, math.nan, math.nan)
-    tail = (1 - confidence) / 2
-    low = float(stats.beta.ppf(tail, k, n - k + 1)) if k else 0.0
-    high = float(stats.beta.ppf(1 - tail, k + 1, n - k)) if k < n else 1.0
-    return Estimate(k / n, low, high)
+    interval = stats.binomtest(k, n).proportion_ci(confidence, method="exact")
+    return Estimate(k / n, float(interval.low), float(interval.high))
 
 
 def share(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate:
@@ -67,6 +65,7 @@ def bootstrap(
     Plain percentiles are those of a normal distribution with s / \sqrt n of divisor n, and so too narrow: of
     five runs a 90 % interval would hold the true mean 77 % of the time. Hesterberg (2015, The American
     Statistician 69, section 5.3) takes percentiles as far out as Student's t with divisor n - 1 is.
+    `scipy.stats.bootstrap` knows no such expansion, and neither do its other methods.
     """
     n = len(values)
     if n < 2:
@@ -97,6 +96,7 @@ def sign_flip(
     n = len(differences)
     if n < 2:
         return np.full(differences.shape[1], np.nan)
+    # Not scipy.stats.permutation_test: for 36 pairs of 50 runs and 22 columns it takes 11 s, and this 0.3 s.
     observed = np.abs(differences.mean(axis=0))
     found = np.abs(_signs(n, rng) @ differences) / n
     # Sums in another order differ in their last bits; those count as equal.

