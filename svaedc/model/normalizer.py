@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from torch import Tensor, nn
 
 SPREAD_FLOOR: Final = 1e-4
-"""Least spread of a dimension, in parts of its range: one that never moves must not divide by zero."""
+"""No dimension's spread is less, in parts of its range: one that never moves must not divide by zero."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,9 @@ def measure(
         bounds: Fixed lower and upper bounds of each observation, which become 0 and 1.
         rank: Principal directions to return; with fewer episodes the last ones are zero.
         rng: Starts the search for directions.
+
+    Returns:
+        Bounds, median, spread and directions.
 
     Raises:
         ValueError: No trajectories, bounds that do not fit, or trajectories that are not finite.
@@ -121,4 +124,4 @@ class Normalizer(nn.Module):
 
 
 POSTERIOR_INPUTS: Final = {"scaled": Normalizer.scaled, "residual": Normalizer.residual}
-"""What q sees of a trajectory; residuals cut the held-out reconstruction error by a fifth."""
+"""q sees a trajectory in one of these forms; residuals cut the held-out reconstruction error by a fifth."""
