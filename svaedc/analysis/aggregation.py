@@ -39,6 +39,9 @@ def summarize(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
         rng: Draws the seed of resamples and sign patterns; those of a pair of methods depend on their names
             only, so A - B mirrors B - A, and a further method changes neither.
 
+    Returns:
+        Every method by itself, and every ordered pair of methods over the runs that both completed.
+
     Raises:
         ValueError: There are no rows, one trial has two, or reporting and tuning seeds are mixed.
     """

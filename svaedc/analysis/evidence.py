@@ -10,7 +10,7 @@ from svaedc.analysis.summary import MethodSummary, Summary
 
 Verdict = Literal["holds", "does not hold", "open", "not measured"]
 Panels = Mapping[str, Summary]
-"""The comparisons of a figure, by the name of their panel."""
+"""These are the comparisons of a figure, by the name of their panel."""
 
 NOTHING: Final = Estimate(math.nan, math.nan, math.nan)
 
@@ -48,7 +48,15 @@ class Evidence(Protocol):
         ...
 
     def found(self, panels: Panels, initial: int) -> Finding:
-        """The number in these comparisons, whose runs began with so many shared random trials."""
+        """Measure the number, and judge the claim by it.
+
+        Args:
+            panels: Comparisons by the name of their panel.
+            initial: Shared random trials that every run began with.
+
+        Returns:
+            The number and its verdict; "not measured" where the panel or the method is missing.
+        """
         ...
 
 
@@ -76,7 +84,15 @@ class Successes:
         return f"{self.method}, share of {self.among} with a success"
 
     def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
-        """Holds if the measured share lies in the range; its interval decides nothing."""
+        """Holds if the measured share lies in the range; its interval decides nothing.
+
+        Args:
+            panels: Comparisons by the name of their panel.
+            initial: Not used: the summary has counted already.
+
+        Returns:
+            The share with its interval, or `UNKNOWN`.
+        """
         method = _method(panels.get(self.panel), self.method)
         if method is None:
             return UNKNOWN
@@ -113,7 +129,15 @@ class MedianGap:
         return f"{self.method}, median gap to {self.optimum:g}{limit}, best after {self.after}"
 
     def found(self, panels: Panels, initial: int) -> Finding:
-        """Holds if the median lies in the range; it has no interval."""
+        """Holds if the median lies in the range; it has no interval.
+
+        Args:
+            panels: Comparisons by the name of their panel.
+            initial: Shared random trials that every run began with.
+
+        Returns:
+            The gap, or `UNKNOWN`, also where a run has fewer trials.
+        """
         method, index = _method(panels.get(self.panel), self.method), initial + self.after - 1
         if method is None or index >= len(method.median_best):
             return UNKNOWN
@@ -142,7 +166,16 @@ class Steadier:
         return f"{self.method}, width of the last interval, {self.panel} / {self.than}"
 
     def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
-        """Holds if the interval of the ratio, over equal numbers of runs, is below 1."""
+        """Holds if the interval of the ratio, over equal numbers of runs, is below 1.
+
+        Args:
+            panels: Comparisons by the name of their panel.
+            initial: Not used: the last trial decides.
+
+        Returns:
+            The ratio with its interval, or `UNKNOWN`, also with fewer than two runs or unequal numbers of
+            them.
+        """
         found = [_method(panels.get(name), self.method) for name in (self.panel, self.than)]
         counts = [method.runs if method else 0 for method in found]
         if min(counts) < 2 or len(set(counts)) > 1:

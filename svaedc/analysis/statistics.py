@@ -21,7 +21,15 @@ class Estimate:
 
 
 def student_t(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate:
-    r"""Mean \pm t_{n-1} s / \sqrt n of the values that are not NaN."""
+    r"""Mean \pm t_{n-1} s / \sqrt n of the values that are not NaN.
+
+    Args:
+        values: One of each run, [runs]; NaN is left out.
+        confidence: Probability in (0, 1) that the interval holds.
+
+    Returns:
+        Mean and interval; of one value the interval is NaN, of none the mean too.
+    """
     values = values[~np.isnan(values)]
     n = len(values)
     if n < 2:
@@ -32,18 +40,32 @@ def student_t(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate
 
 
 def proportion(hits: Bool[np.ndarray, " runs"], confidence: float) -> Estimate:
-    """Share of runs, with the exact binomial interval of Clopper and Pearson (1934)."""
+    """Share of runs, with the exact binomial interval of Clopper and Pearson (1934).
+
+    Args:
+        hits: Whether each run counts, [runs].
+        confidence: Probability in (0, 1) that the interval holds.
+
+    Returns:
+        The share and its interval, in [0, 1]; all NaN without runs.
+    """
     n, k = len(hits), int(hits.sum())
     if not n:
         return Estimate(math.nan, math.nan, math.nan)
-    tail = (1 - confidence) / 2
-    low = float(stats.beta.ppf(tail, k, n - k + 1)) if k else 0.0
-    high = float(stats.beta.ppf(1 - tail, k + 1, n - k)) if k < n else 1.0
-    return Estimate(k / n, low, high)
+    interval = stats.binomtest(k, n).proportion_ci(confidence, method="exact")
+    return Estimate(k / n, float(interval.low), float(interval.high))
 
 
 def share(values: Float[np.ndarray, " runs"], confidence: float) -> Estimate:
-    """Mean of shares in [0, 1], one of each run; the interval of `student_t`, cut at both ends."""
+    """Mean of shares; the interval is that of `student_t`, cut at 0 and 1.
+
+    Args:
+        values: Share of each run in [0, 1], [runs]; NaN is left out.
+        confidence: Probability in (0, 1) that the interval holds.
+
+    Returns:
+        Mean and interval, NaN as those of `student_t`.
+    """
     found = student_t(values, confidence)
     return Estimate(found.mean, *np.clip([found.low, found.high], 0, 1).tolist())
 
@@ -53,6 +75,15 @@ def ratio(narrow: float, wide: float, runs: int, confidence: float) -> Estimate:
 
     It is exact for normal values, and too narrow where a few runs are far off. The groups count as
     independent.
+
+    Args:
+        narrow: Standard deviation of the first group, or any multiple of it.
+        wide: The same of the second group.
+        runs: Runs of each group, at least two.
+        confidence: Probability in (0, 1) that the interval holds.
+
+    Returns:
+        Narrow / wide and its interval; infinite where `wide` is 0.
     """
     found = narrow / wide if wide else math.inf
     far = math.sqrt(stats.f.ppf((1 + confidence) / 2, runs - 1, runs - 1))
@@ -67,6 +98,15 @@ def bootstrap(
     Plain percentiles are those of a normal distribution with s / \sqrt n of divisor n, and so too narrow: of
     five runs a 90 % interval would hold the true mean 77 % of the time. Hesterberg (2015, The American
     Statistician 69, section 5.3) takes percentiles as far out as Student's t with divisor n - 1 is.
+    `scipy.stats.bootstrap` has no such expanded percentiles.
+
+    Args:
+        values: One row of each run, [runs, columns].
+        confidence: Probability in (0, 1) that the interval holds.
+        rng: Draws the resamples, the same for all columns.
+
+    Returns:
+        Mean and interval of each column; of one run the interval is NaN, of none the mean too.
     """
     n = len(values)
     if n < 2:
@@ -81,22 +121,32 @@ def bootstrap(
 
 
 FLIPS: Final = 10_000
-"""Random sign patterns; the smallest p value is 1 / (FLIPS + 1)."""
+"""So many random sign patterns are tried; the smallest p value is 1 / (FLIPS + 1)."""
 _EXACT_UP_TO: Final = 13
-"""Runs with whose fewer than FLIPS sign patterns all are tried."""
+"""Up to so many runs have fewer than FLIPS sign patterns, and all are tried."""
 
 
 def sign_flip(
     differences: Float[np.ndarray, "runs columns"], rng: np.random.Generator
 ) -> Float[np.ndarray, " columns"]:
-    """Two-sided p value of each column's mean, if the sign of every run's difference were a coin's.
+    """Test whether each column's mean is zero, as if the sign of every run's difference were a coin's.
 
     The test behind a paired comparison that assumes no distribution: under the null hypothesis the two
-    methods could have swapped names in any run. NaN with fewer than two runs, or where a difference is NaN.
+    methods could have swapped names in any run. Of up to 13 runs all sign patterns are tried, of more
+    `FLIPS` random ones.
+
+    Args:
+        differences: Method minus baseline in each shared run, [runs, columns].
+        rng: Draws the signs where not all patterns are tried.
+
+    Returns:
+        Two-sided p value of each column, [columns]. NaN with fewer than two runs, or where a difference is
+        NaN.
     """
     n = len(differences)
     if n < 2:
         return np.full(differences.shape[1], np.nan)
+    # Not scipy.stats.permutation_test: for 36 pairs of 50 runs and 22 columns it takes 11 s, and this 0.3 s.
     observed = np.abs(differences.mean(axis=0))
     found = np.abs(_signs(n, rng) @ differences) / n
     # Sums in another order differ in their last bits; those count as equal.

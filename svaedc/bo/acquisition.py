@@ -20,19 +20,19 @@ from svaedc.bo.history import History
 
 RESTARTS: Final = 5
 RAW_SAMPLES: Final = 256
-"""Points that `optimize_acqf` draws, to start from the most promising ones."""
+"""`optimize_acqf` draws so many points, and starts from the most promising ones."""
 ITERATIONS: Final = 200
-"""Of L-BFGS from each of them."""
+"""L-BFGS takes at most so many from each of them."""
 BLOCK: Final = 1_000
-"""Candidates whose values are computed at once: intermediate results stay in the processor's caches."""
+"""So many candidates are valued at once: intermediate results stay in the processor's caches."""
 DRAWS: Final = 64
-"""Random controllers from which the first allowed one is taken."""
+"""The first allowed one of so many random controllers is taken."""
 _PENALTY: Final = 1e3
-"""Per unit of predicted badness beyond what is allowed; acquisitions are of the order of 1."""
+"""A unit of predicted badness beyond what is allowed costs so much; acquisitions are of the order of 1."""
 _TOLERANCE: Final = 1e-2
 
 Value = Callable[[Tensor], Tensor]
-"""The acquisition [*batch, n] at features [*batch, n, k], each on its own."""
+"""It returns the acquisition [*batch, n] at features [*batch, n, k], each on its own."""
 
 
 @runtime_checkable
@@ -42,13 +42,32 @@ class Search(Protocol):
     def anywhere(
         self, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
-        """A controller for a trial before which nothing is known."""
+        """Draw a controller for a trial before which nothing is known.
+
+        Args:
+            candidates: What may be suggested, with features and bounds.
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         ...
 
     def maximize(
         self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
-        """The controller of largest value that is worth a trial."""
+        """Seek the controller of largest value that is worth a trial.
+
+        Args:
+            value: Acquisition to maximise, of features.
+            candidates: What may be suggested, with features and bounds.
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         ...
 
 
@@ -58,7 +77,16 @@ class OverPool:
     def anywhere(
         self, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
-        """A uniform draw from the candidates no trial was spent on."""
+        """Draw uniformly from the candidates no trial was spent on.
+
+        Args:
+            candidates: A pool, at least one of them untried.
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Candidate, [D], a copy.
+        """
         return candidates.x[rng.choice(candidates.untried(history))].copy()
 
     def maximize(
@@ -68,7 +96,17 @@ class OverPool:
         history: History,
         rng: np.random.Generator,  # noqa: ARG002
     ) -> Float32[np.ndarray, " D"]:
-        """The untried candidate of largest value."""
+        """Take the untried candidate of largest value.
+
+        Args:
+            value: Acquisition to maximise, of features.
+            candidates: A pool, at least one of them untried.
+            history: Trials of the run so far.
+            rng: Not used: the pool is searched as a whole.
+
+        Returns:
+            Candidate, [D], a copy.
+        """
         untried = candidates.untried(history)
         cuts = range(BLOCK, len(untried), BLOCK)
         with torch.no_grad():
@@ -85,7 +123,16 @@ class ByGradient:
         history: History,  # noqa: ARG002
         rng: np.random.Generator,
     ) -> Float32[np.ndarray, " D"]:
-        """A uniform draw between the bounds, of the controllers that are not predicted too bad."""
+        """Draw uniformly between the bounds, until a controller is not predicted too bad.
+
+        Args:
+            candidates: What may be suggested, with features and bounds.
+            history: Not used: no draw repeats itself.
+            rng: Generator of the trial.
+
+        Returns:
+            The first allowed one of `DRAWS` controllers, [D], or else the least bad.
+        """
         low, high = candidates.low.numpy(), candidates.high.numpy()
         x = (low + (high - low) * rng.random((DRAWS, len(low)))).astype(np.float32)
         with torch.no_grad():
@@ -95,10 +142,19 @@ class ByGradient:
     def maximize(
         self, value: Value, candidates: Candidates, history: History, rng: np.random.Generator
     ) -> Float32[np.ndarray, " D"]:
-        """The controller of largest value, or a random one where that was tried already.
+        """Seek the controller of largest value, or draw one where that is too bad or was tried already.
 
         A trial under the same physics would repeat its outcome, and one that failed taught the surrogate
         nothing: it would be asked for again and again.
+
+        Args:
+            value: Acquisition to maximise, of features.
+            candidates: What may be suggested, with features and bounds.
+            history: Trials of the run so far.
+            rng: Draws starting points, and the random controller.
+
+        Returns:
+            Controller, [D], in the unit cube.
         """
         with torch_randomness(rng), warnings.catch_warnings():
             # A flat acquisition, as after equal outcomes, makes BoTorch warn of every starting point.
@@ -141,17 +197,26 @@ def torch_randomness(rng: np.random.Generator) -> Iterator[None]:
 
 
 BETA: Final = 1.0
-"""Weight of the variance in UCB (section 6 of the paper)."""
+"""This is the weight of the variance in UCB (section 6 of the paper)."""
 
 Acquisition = Callable[[Tensor, Tensor, float], Tensor]
-"""Value of a controller: of the mean and standard deviation of its f, and of the largest f measured."""
+"""It values a controller by the mean and standard deviation of its f, and by the largest f measured."""
 
 _FAR_BELOW: Final = -1e3
 """Below, 1 - |z| sqrt(pi/2) erfcx(|z|/sqrt 2) is 1/z^2 to rounding, and the difference would cancel."""
 
 
 def ucb(mu: Float[Tensor, "*n"], sigma: Float[Tensor, "*n"], best: float) -> Float[Tensor, "*n"]:  # noqa: ARG001
-    r"""UCB(x) = \mu(x) + \sqrt\beta \sigma(x) with beta = 1, the root as in BoTorch."""
+    r"""UCB(x) = \mu(x) + \sqrt\beta \sigma(x) with beta = 1, the root as in BoTorch.
+
+    Args:
+        mu: Mean of f, [*n].
+        sigma: Its standard deviation, [*n].
+        best: Not used: UCB compares with nothing.
+
+    Returns:
+        Values, [*n], in the unit of f.
+    """
     return mu + BETA**0.5 * sigma
 
 
@@ -160,6 +225,14 @@ def log_ei(mu: Float[Tensor, "*n"], sigma: Float[Tensor, "*n"], best: float) -> 
 
     Its logarithm, because expected improvement itself is zero in floating point almost everywhere after a few
     trials (Ament et al., NeurIPS 2023).
+
+    Args:
+        mu: Mean of f, [*n].
+        sigma: Its standard deviation, above 0, [*n].
+        best: Largest objective measured.
+
+    Returns:
+        Values, [*n], finite also where expected improvement would round to 0.
     """
     return sigma.log() + _log_h((mu - best) / sigma)
 

@@ -114,14 +114,30 @@ class Candidates:
 
     @classmethod
     def of(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
-        """The pool with the features `embed` gives it, in units of their typical distance."""
+        """Give the pool features in units of their typical distance.
+
+        Args:
+            problem: What the methods of a run share.
+            embed: Features [n, k] of controllers [n, D], float64.
+
+        Returns:
+            The pool; the unit is 1 where it is empty or all features are the same.
+        """
         raw = cls.unscaled(problem, embed)
         unit = math.sqrt(2 * float(raw.phi.var(dim=0, correction=0).sum())) if len(raw.x) else 1.0
         return raw.in_units_of(unit or 1.0)
 
     @classmethod
     def unscaled(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
-        """The pool with the features `embed` gives it, as they are."""
+        """Give the pool features as they are.
+
+        Args:
+            problem: What the methods of a run share.
+            embed: Features [n, k] of controllers [n, D], float64.
+
+        Returns:
+            The pool with a unit of 1, between the bounds of the unit cube.
+        """
         with torch.no_grad():
             phi = embed(torch.tensor(problem.pool).double())
         low = torch.zeros(problem.dimensions).double()
@@ -132,7 +148,15 @@ class Candidates:
         return replace(self, phi=self.phi / unit, unit=unit)
 
     def within(self, low: Float[Tensor, " D"], high: Float[Tensor, " D"]) -> "Candidates":
-        """As many candidates in a box: these, squeezed into it."""
+        """Squeeze the candidates into a box.
+
+        Args:
+            low: Lower corner, [D].
+            high: Upper corner, [D].
+
+        Returns:
+            As many candidates, whose features are computed anew and whose bounds are the box.
+        """
         x = (low + (high - low) * torch.tensor(self.x)).float()
         return replace(self, x=x.numpy(), phi=self.features_of(x.double()), low=low, high=high)
 
@@ -168,13 +192,29 @@ def in_the_cube(problem: Problem) -> Candidates:
 
 
 def by_latents(problem: Problem, embedding: Embedding) -> Candidates:
-    """The pool, compared by latent paths: phi(x) = embedding(tau of x, y of x)."""
+    """The pool, compared by latent paths: phi(x) = embedding(tau of x, y of x).
+
+    Args:
+        problem: What the methods of a run share, with latents.
+        embedding: phi of latent paths [n, k] and badness [n].
+
+    Returns:
+        The pool, in units of the features' typical distance.
+    """
     latents = problem.known_latents()
     return Candidates.of(problem, lambda x: embedding(*latents.means(x)))
 
 
 def by_density(problem: Problem, density: Density) -> Candidates:
-    """The pool, compared by distributions, whose divergence has no unit: phi(x) = [location | log scale]."""
+    """The pool, compared by distributions, whose divergence has no unit: phi(x) = [location | log scale].
+
+    Args:
+        problem: What the methods of a run share.
+        density: Distribution of each controller.
+
+    Returns:
+        The pool, with the rows that the density's divergence compares as features.
+    """
     return Candidates.unscaled(problem, density.rows)
 
 

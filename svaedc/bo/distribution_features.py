@@ -19,6 +19,13 @@ def gaussian(p: Float[Tensor, "*p n dd"], q: Float[Tensor, "*q m dd"]) -> Float[
     r"""KL(p_i || q_j) = 1/2 \sum_d [(s_i^2 + (\mu_i - \mu_j)^2) / s_j^2 - 1 - log(s_i^2 / s_j^2)].
 
     The squares are multiplied out, so that all pairs cost three matrix products.
+
+    Args:
+        p: Rows [mean | log standard deviation], [*p, n, 2 d].
+        q: Such rows, [*q, m, 2 d].
+
+    Returns:
+        All pairs, [*pq, n, m], at least 0.
     """
     (mu_p, log_p), (mu_q, log_q) = p.chunk(2, dim=-1), q.chunk(2, dim=-1)
     # Locations around a common point: the products then cancel no digits that matter.
@@ -33,7 +40,15 @@ def gaussian(p: Float[Tensor, "*p n dd"], q: Float[Tensor, "*q m dd"]) -> Float[
 
 
 def laplace(p: Float[Tensor, "*p n dd"], q: Float[Tensor, "*q m dd"]) -> Float[Tensor, "*pq n m"]:
-    r"""KL(p_i || q_j) = \sum_d [log(b_j / b_i) + r/b_j + b_i/b_j e^{-r/b_i} - 1] with r = |\mu_i - \mu_j|."""
+    r"""KL(p_i || q_j) = \sum_d [log(b_j / b_i) + r/b_j + b_i/b_j e^{-r/b_i} - 1] with r = |\mu_i - \mu_j|.
+
+    Args:
+        p: Rows [location | log scale], [*p, n, 2 d].
+        q: Such rows, [*q, m, 2 d].
+
+    Returns:
+        All pairs, [*pq, n, m], at least 0.
+    """
     (mu_p, log_p), (mu_q, log_q) = p.unsqueeze(-2).chunk(2, dim=-1), q.unsqueeze(-3).chunk(2, dim=-1)
     distance = (mu_p - mu_q).abs()
     each = (
@@ -46,13 +61,13 @@ def laplace(p: Float[Tensor, "*p n dd"], q: Float[Tensor, "*q m dd"]) -> Float[T
 
 
 Divergence = Callable[[Tensor, Tensor], Tensor]
-"""KL(p_i || q_j) of all pairs of rows [location | log scale]."""
+"""It returns KL(p_i || q_j) of all pairs of rows [location | log scale]."""
 
 STEPS: Final = 10
-"""Evenly spaced steps of a trajectory that BBK-KL compares: neighbouring ones repeat each other, and alpha
+"""BBK-KL compares so many evenly spaced steps of a trajectory: neighbouring ones repeat each other, and alpha
 absorbs the common factor that D loses."""
 BLOCK: Final = 250
-"""Controllers decoded at once, so that memory does not grow with the pool."""
+"""So many controllers are decoded at once, so that memory does not grow with the pool."""
 _LEAST_VARIANCE: Final = 1e-12
 _DIVERGENCES: Final = {"laplace": laplace, "gaussian": gaussian}
 
@@ -111,7 +126,15 @@ class Densities:
 
 
 def latent_rows(model: Generative, x: Float[Tensor, "n D"]) -> Float[Tensor, "n rows"]:
-    """p(tau|x) as [location | log scale], flattened over the path."""
+    """Compute p(tau|x) as [location | log scale].
+
+    Args:
+        model: Frozen, in evaluation mode.
+        x: Controllers in the unit cube, [n, D].
+
+    Returns:
+        Rows [n, 2 d], float64; d elements of the latent path, flattened.
+    """
     q = model.prior(x.float())
     (loc, _), (scale, _) = model.split(q.loc), model.split(q.scale)
     return torch.cat([loc, scale.log()], dim=-1).double()
@@ -123,6 +146,13 @@ def trajectory_rows(model: Generative, x: Float[Tensor, "n D"]) -> Float[Tensor,
     E[xi] is the mean of the decoded locations, Var[xi] = E[Var[xi|tau]] + Var[E[xi|tau]], over latent paths
     that have the mean and the covariance of p(tau|x), so both are exact for a linear decoder. They are always
     the same ones, because fresh ones would make k(x, x) differ from 1.
+
+    Args:
+        model: Frozen, in evaluation mode.
+        x: Controllers in the unit cube, [n, D].
+
+    Returns:
+        Rows [n, 2 d], float64; d observations times at most `STEPS` steps, flattened.
     """
     return torch.cat([_moments(model, block) for block in x.float().split(BLOCK)])
 

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 LatentMeans = Callable[[Tensor], tuple[Tensor, Tensor]]
-"""E[tau | x] and the predicted badness of controllers [n, D]."""
+"""It returns E[tau | x] and the predicted badness of controllers [n, D]."""
 Embedding = Callable[[Tensor, Tensor], Tensor]
-"""phi(x) of tau [..., k] and y [...]."""
+"""It returns phi(x) of tau [..., k] and y [...]."""
 
 _LEAST_SCALE = 0.1
 """A latent dimension is collapsed below this share of the widest one (SPEC: active dimensions); whitening
@@ -40,7 +40,15 @@ class Latents:
 
     @classmethod
     def of(cls, pool: Float[Tensor, "n D"], at: LatentMeans) -> "Latents":
-        """The latents of a pool."""
+        """Compute the latents of a pool.
+
+        Args:
+            pool: Controllers in the unit cube, [n, D].
+            at: The model's `latent_means`.
+
+        Returns:
+            Those of the pool in float64, without gradients; `at` goes along for other controllers.
+        """
         with torch.no_grad():
             return cls(*_means(at, pool), at)
 
@@ -56,12 +64,28 @@ def _means(at: LatentMeans, x: Float[Tensor, "n D"]) -> tuple[Tensor, Tensor]:
 
 
 def svae(tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:  # noqa: ARG001
-    r"""phi(x) = \bar\tau_x: the latent path as it is, whatever its badness."""
+    r"""phi(x) = \bar\tau_x: the latent path as it is, whatever its badness.
+
+    Args:
+        tau: Latent paths, [*n, k].
+        y: Not used: badness compresses nothing here.
+
+    Returns:
+        Features, [*n, k]: `tau` itself.
+    """
     return tau
 
 
 def svae_dc(tau: Float[Tensor, "*n k"], y: Float[Tensor, "*n"]) -> Float[Tensor, "*n k"]:
-    r"""phi(x) = (1 - \bar y_x) \bar\tau_x: dynamic compression, equation (k_svae_dc_dist)."""
+    r"""phi(x) = (1 - \bar y_x) \bar\tau_x: dynamic compression, equation (k_svae_dc_dist).
+
+    Args:
+        tau: Latent paths, [*n, k].
+        y: Predicted badness in [0, 1], [*n].
+
+    Returns:
+        Features, [*n, k]; those of the worst controllers meet in the origin.
+    """
     return (1 - y).unsqueeze(-1) * tau
 
 

@@ -26,9 +26,9 @@ from linear_operator.utils.errors import NanError, NotPSDError
 from torch import Tensor
 
 LEAST_NOISE = 1e-4
-"""Variance; the smallest with which no Cholesky factorisation failed in float64."""
+"""This is the smallest variance with which no Cholesky factorisation failed in float64."""
 FIT_ITERATIONS = 25
-"""Of L-BFGS; with 22 trials in 48 dimensions the chosen controller no longer changes after 15."""
+"""L-BFGS stops after so many; with 22 trials in 48 dimensions the choice no longer changes after 15."""
 _LEAST_VARIANCE = 1e-12
 _NOTHING, _ONE = torch.tensor(0.0), torch.tensor(1.0)
 
@@ -45,7 +45,7 @@ class Posterior(Protocol):
 
 
 Fit = Callable[[Tensor, Tensor], Posterior]
-"""From the features [n, k] and objectives [n] of the trials to what is expected elsewhere."""
+"""It turns features [n, k] and objectives [n] of the trials into what is expected elsewhere."""
 
 
 class GaussianProcess:
@@ -83,10 +83,17 @@ class GaussianProcess:
 
 
 def scale_objectives(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
-    """Objectives with the setup's limits at 0 and 1.
+    """Put the setup's limits at 0 and 1.
 
     The limits are fixed per setup. Standardising by the few values of a run would make its first step depend
     on the luck of two random trials.
+
+    Args:
+        f: Objectives, [n].
+        limits: Objectives that become 0 and 1.
+
+    Returns:
+        Scaled objectives, [n]; outside [0, 1] where an objective is beyond the limits.
     """
     low, high = limits
     return (f - low) / (high - low)
@@ -103,6 +110,9 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
         kernel: Makes the kernel, with its starting hyper-parameters.
         phi: Features of the trials, float64, of root-mean-square distance near 1.
         f: Objectives, scaled to [0, 1].
+
+    Returns:
+        The process, conditioned on all trials; its `event` says what went wrong, if anything did.
     """
     process = _process(kernel(), phi, f)
     event = ""
@@ -149,7 +159,15 @@ _log = logging.getLogger(__name__)
 
 
 def default(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
-    """BoTorch's default process: SE with dimension-scaled priors (Hvarfner et al., ICML 2024)."""
+    """BoTorch's default process: SE with dimension-scaled priors (Hvarfner et al., ICML 2024).
+
+    Args:
+        x: Controllers of the trials, [n, D].
+        f: Their objectives in any unit, [n].
+
+    Returns:
+        The fitted process, in the unit of `f`.
+    """
     return _fit(SingleTaskGP, x, f)
 
 
@@ -157,12 +175,27 @@ def saas(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """A sum of Matern kernels under sparsity priors (Eriksson and Jankowiak, UAI 2021).
 
     BoTorch's maximum-a-posteriori form: its Markov chain Monte Carlo takes minutes for each trial.
+
+    Args:
+        x: Controllers of the trials, [n, D].
+        f: Their objectives in any unit, [n].
+
+    Returns:
+        The fitted process, in the unit of `f`.
     """
     return _fit(AdditiveMapSaasSingleTaskGP, x, f)
 
 
 def turbo(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
-    """The process of TuRBO's reference code: Matern-5/2 with bounded lengthscales and little noise."""
+    """The process of TuRBO's reference code: Matern-5/2 with bounded lengthscales and little noise.
+
+    Args:
+        x: Controllers of the trials, [n, D].
+        f: Their objectives in any unit, [n].
+
+    Returns:
+        The fitted process, in the unit of `f`.
+    """
     return _fit(_matern_of_turbo, x, f)
 
 

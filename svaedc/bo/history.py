@@ -62,7 +62,15 @@ class History:
         return np.concatenate([self.x, self.failed])
 
     def append(self, x: Float[np.ndarray, " D"], f: float) -> "History":
-        """The history after one more trial; a trial without objective (f is NaN) counts as failed."""
+        """Add one more trial.
+
+        Args:
+            x: Its controller in the unit cube, [D].
+            f: Its objective; NaN if it gave none, and then the controller counts as failed.
+
+        Returns:
+            A new history; this one stays as it is.
+        """
         if np.isnan(f):
             return History(self.x, self.f, np.concatenate([self.failed, x[None]]))
         return History(np.concatenate([self.x, x[None]]), np.append(self.f, f), self.failed)

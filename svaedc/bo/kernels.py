@@ -12,11 +12,11 @@ from svaedc.bo.distribution_features import Divergence
 from svaedc.bo.features import Embedding
 
 OUTPUT_SCALE = (0.1, 1.0)
-"""Range of sigma_k^2 for an objective scaled to [0, 1]."""
+"""sigma_k^2 lies in this range, for an objective scaled to [0, 1]."""
 LENGTHSCALE = (0.1, 10.0)
-"""Range of each lengthscale for features whose root-mean-square distance is 1."""
+"""Each lengthscale lies in this range, for features whose root-mean-square distance is 1."""
 JITTER = 1e-6
-"""By which the smallest eigenvalue of a KL kernel's matrix of trials is kept above zero."""
+"""The smallest eigenvalue of a KL kernel's matrix of trials is kept at least so far above zero."""
 
 
 def se(lengthscales: int) -> ScaleKernel:
@@ -45,6 +45,9 @@ def kl(divergence: Divergence, median: float) -> ScaleKernel:
     Args:
         divergence: KL of all pairs of rows.
         median: Of D over simulated controllers; alpha starts at its inverse.
+
+    Returns:
+        The kernel; rows [location | log scale] are its inputs.
     """
     return _scale(SymmetrizedKl(divergence, median))
 
@@ -58,6 +61,9 @@ def compressed_kernel(outer: Kernel, embedding: Embedding) -> "Embedded":
     Args:
         outer: k_0, `se(...)` or `matern(...)`.
         embedding: phi, for example `svae_dc`.
+
+    Returns:
+        The kernel; its inputs are rows [tau | y].
     """
     return Embedded(outer, lambda rows: embedding(rows[..., :-1], rows[..., -1]))
 
@@ -76,7 +82,16 @@ class Embedded(Kernel):
         self.phi = phi
 
     def forward(self, x1: Tensor, x2: Tensor, **params: Any) -> Any:
-        """The kernel matrix [..., n, m], as GPyTorch calls it."""
+        """Compute the kernel matrix, as GPyTorch calls it.
+
+        Args:
+            x1: What `phi` takes, [..., n, d].
+            x2: The same, [..., m, d].
+            **params: Passed on to k_0.
+
+        Returns:
+            The matrix, [..., n, m], or what k_0 makes of `params`.
+        """
         return self.outer.forward(self.phi(x1), self.phi(x2), **params)
 
 
@@ -105,7 +120,17 @@ class SymmetrizedKl(Kernel):
         return self.raw_alpha_constraint.transform(self.raw_alpha)
 
     def forward(self, x1: Tensor, x2: Tensor, diag: bool = False, **_: Any) -> Tensor:  # noqa: FBT001, FBT002
-        """The kernel matrix [..., n, m], or its diagonal [..., n], as GPyTorch calls it."""
+        """Compute the kernel matrix, as GPyTorch calls it.
+
+        Args:
+            x1: Rows [location | log scale], [..., n, 2 d].
+            x2: Such rows, [..., m, 2 d].
+            diag: Whether only the diagonal is asked for.
+            **_: Not used.
+
+        Returns:
+            The matrix, [..., n, m], or its diagonal, [..., n].
+        """
         if diag:
             return torch.ones_like(x1[..., 0])
         likeness = torch.exp(-self.alpha * distance(self.divergence, x1, x2))
@@ -113,7 +138,16 @@ class SymmetrizedKl(Kernel):
 
 
 def distance(divergence: Divergence, p: Tensor, q: Tensor) -> Tensor:
-    r"""D = \sqrt{KL(p||q)} + \sqrt{KL(q||p)} of all pairs of rows, [..., n, m]."""
+    r"""D = \sqrt{KL(p||q)} + \sqrt{KL(q||p)} of all pairs of rows.
+
+    Args:
+        divergence: KL of all pairs of rows.
+        p: Rows [location | log scale], [..., n, 2 d].
+        q: Such rows, [..., m, 2 d].
+
+    Returns:
+        Distances, [..., n, m]; without a derivative where they are 0.
+    """
     return _root(divergence(p, q)) + _root(divergence(q, p).mT)
 
 

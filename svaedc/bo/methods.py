@@ -32,7 +32,15 @@ class Method(Protocol):
     """A way to choose the next controller."""
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """The next controller, in the unit cube: a pure function of its construction and these arguments."""
+        """Choose the next controller: a pure function of the construction and these arguments.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         ...
 
 
@@ -43,7 +51,15 @@ class UniformSearch:
     dimensions: int
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:  # noqa: ARG002
-        """A uniform draw."""
+        """Draw uniformly.
+
+        Args:
+            history: Not used.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         return rng.random(self.dimensions).astype(np.float32)
 
 
@@ -54,7 +70,15 @@ class PoolSearch:
     candidates: Candidates
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """A uniform draw from the candidates no trial was spent on."""
+        """Draw uniformly from the candidates no trial was spent on.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Candidate, [D].
+        """
         return OverPool().anywhere(self.candidates, history, rng)
 
 
@@ -73,7 +97,15 @@ class BayesianOptimization:
     search: Search
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """The controller of largest acquisition; before the first measurement, any."""
+        """Choose the controller of largest acquisition; before the first measurement, any.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         candidates = self.surrogate.candidates
         if not len(history):
             return self.search.anywhere(candidates, history, rng)
@@ -91,7 +123,15 @@ class TrustRegionOptimization:
     search: Search
 
     def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """The controller of largest acquisition in the box; where a box begins, any."""
+        """Choose the controller of largest acquisition in the box; where a box begins, any.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+        """
         region = TrustRegion.after(history.f.tolist(), history.x.shape[1])
         if region.begins:
             return self.search.anywhere(self.surrogate.candidates, history, rng)
@@ -162,7 +202,14 @@ def needs_model(name: str) -> bool:
 
 
 def build(name: str, problem: Problem) -> Method:
-    """The method of this name for one run.
+    """Build a method for one run.
+
+    Args:
+        name: One of `names()`, perhaps with a search and an acquisition behind it.
+        problem: What the methods of a run share.
+
+    Returns:
+        The method.
 
     Raises:
         LookupError: There is no such method.
@@ -176,7 +223,12 @@ def build(name: str, problem: Problem) -> Method:
 
 
 def require(name: str, problem: Problem, trials: int) -> None:
-    """Refuses a method that could not suggest so many controllers.
+    """Refuse a method that could not suggest so many controllers.
+
+    Args:
+        name: One of `names()`, perhaps with a search and an acquisition behind it.
+        problem: What the methods of a run share.
+        trials: Controllers it has to suggest.
 
     Raises:
         LookupError: There is no such method.

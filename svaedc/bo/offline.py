@@ -16,7 +16,7 @@ from svaedc.bo.features import LatentMeans, Latents
 from svaedc.bo.loop import Outcome, trials
 
 INITIAL = 2
-"""Random trials that all methods of a run share, as in a comparison."""
+"""All methods of a run share so many random trials, as in a comparison."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,9 @@ def worth(method: str, recorded: Recorded, latent_means: LatentMeans, runs: int,
         latent_means: Of the model.
         runs: Each has other random first trials; the same for every method and model.
         count: Trials the method suggests.
+
+    Returns:
+        Means over all runs.
     """
     pool = torch.from_numpy(recorded.x)
     latents = Latents.of(pool, latent_means)

@@ -19,10 +19,10 @@ LAST_LAYERS: Final = (
     "badness.output.weight",
     "badness.output.bias",
 )
-"""The parameters of an `SvaeDc` that p(tau, psi|x) and p(y|psi) end with."""
+"""p(tau, psi|x) and p(y|psi) of an `SvaeDc` end with these parameters."""
 
 SPREAD: Final = 0.1
-"""Standard deviation of a weight around its trained value, in units of its layer's root mean square."""
+"""A weight has this standard deviation around its trained value, in units of its layer's root mean square."""
 SPREAD_OF_LOG_ALPHA: Final = 0.5
 SPREAD_OF_C: Final = 0.1
 

@@ -18,13 +18,13 @@ from svaedc.bo.history import History
 from svaedc.bo.online import AdjustedPaths
 
 LEAST_BAD: Final = 0.3
-"""Share of the pool that screening keeps."""
+"""Screening keeps this share of the pool."""
 _FOR_MEDIAN: Final = 100
-"""Simulated controllers whose distances say where alpha starts."""
+"""Distances of so many simulated controllers say where alpha starts."""
 _AS_MEASURED: Final = (0.0, 1.0)
 
 KernelOf = Callable[[int], Kernel]
-"""A kernel with that many lengthscales."""
+"""It makes a kernel with that many lengthscales."""
 
 
 @dataclass(frozen=True)
@@ -50,39 +50,95 @@ class Surrogate:
 
 
 def on_controllers(kernel: KernelOf, problem: Problem) -> Surrogate:
-    """k_0 on x, with a lengthscale for every controller parameter."""
+    """k_0 on x, with a lengthscale for every controller parameter.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share.
+
+    Returns:
+        The surrogate; objectives are scaled to the problem's limits.
+    """
     return _kernel_surrogate(as_they_are(problem), partial(kernel, problem.dimensions), problem)
 
 
 def on_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on \bar\tau, with a lengthscale for every latent dimension."""
+    r"""k_0 on \bar\tau, with a lengthscale for every latent dimension.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with latents.
+
+    Returns:
+        The surrogate.
+    """
     return _on_latents(svae, kernel, problem)
 
 
 def on_compressed_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on (1 - \bar y) \bar\tau, equation (k_svae_dc)."""
+    r"""k_0 on (1 - \bar y) \bar\tau, equation (k_svae_dc).
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with the latents of an SVAE-DC.
+
+    Returns:
+        The surrogate.
+    """
     problem.known_badness()
     return _on_latents(svae_dc, kernel, problem)
 
 
 def on_sigmoid_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau."""
+    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with the latents of an SVAE-DC.
+
+    Returns:
+        The surrogate.
+    """
     problem.known_badness()
     return _on_latents(Sigmoid(), kernel, problem)
 
 
 def on_whitened_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on (1 - \bar y) \bar\tau / s."""
+    r"""k_0 on (1 - \bar y) \bar\tau / s.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with the latents of an SVAE-DC for at least two controllers.
+
+    Returns:
+        The surrogate; s is the spread over the pool.
+    """
     return _on_latents(Whitened.over(problem.known_badness().tau), kernel, problem)
 
 
 def on_screened_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on \bar\tau, among the controllers predicted least bad."""
+    r"""k_0 on \bar\tau, among the controllers predicted least bad.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with the latents of an SVAE-DC.
+
+    Returns:
+        The surrogate over this share of the pool (`LEAST_BAD`).
+    """
     return on_paths(kernel, problem.least_bad(LEAST_BAD))
 
 
 def on_adjusted_paths(kernel: KernelOf, problem: Problem) -> Surrogate:
-    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers."""
+    r"""k_0 on sigmoid(\alpha((1 - \bar y) - c)) \bar\tau, fitted with alpha, c and the last layers.
+
+    Args:
+        kernel: k_0, made from its number of lengthscales.
+        problem: What the methods of a run share, with the latents of an SVAE-DC and its adjustable layers.
+
+    Returns:
+        The surrogate; its candidates are compared in the unit cube, because phi is part of the kernel.
+    """
     problem.known_badness()
     start, adjustable = Sigmoid(), problem.known_adjustable()
     trained = by_latents(problem, start)
@@ -104,7 +160,15 @@ def on_latent_distributions(problem: Problem) -> Surrogate:
 
 
 def packaged_gp(fit: Fit, problem: Problem) -> Surrogate:
-    """A process of others on x, in the objective's own units, as they expect them."""
+    """A process of others on x, in the objective's own units, as they expect them.
+
+    Args:
+        fit: Fits a process to controllers and objectives.
+        problem: What the methods of a run share; its objective limits are not used.
+
+    Returns:
+        The surrogate.
+    """
     return Surrogate(in_the_cube(problem), fit, _AS_MEASURED)
 
 

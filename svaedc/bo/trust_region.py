@@ -12,11 +12,11 @@ from torch import Tensor
 FIRST_LENGTH: Final = 0.8
 LARGEST_LENGTH: Final = 1.6
 SMALLEST_LENGTH: Final = 0.5**7
-"""Sides of the box before weighting (Eriksson et al., NeurIPS 2019); below the smallest it starts anew."""
+"""All are sides of the box before weighting (Eriksson et al., NeurIPS 2019); a smaller one starts anew."""
 SUCCESSES: Final = 3
-"""In a row, after which the box doubles."""
+"""After so many in a row the box doubles."""
 RANDOM_TRIALS: Final = 2
-"""At the start of every box, as at the start of a run."""
+"""Every box starts with so many, as a run does."""
 _LEAST_GAIN: Final = 1e-3
 
 
@@ -44,7 +44,15 @@ class TrustRegion:
 
     @classmethod
     def after(cls, f: Sequence[float], dimensions: int) -> "TrustRegion":
-        """The state that a run with these objectives has led to; trials without one change nothing."""
+        """Replay a run; trials without an objective change nothing.
+
+        Args:
+            f: Objectives measured, in the order of their trials.
+            dimensions: D.
+
+        Returns:
+            The state that they have led to.
+        """
         state = cls(dimensions)
         for each in f:
             state = state.then(each)
@@ -72,7 +80,15 @@ class TrustRegion:
     def box(
         self, center: Float[Tensor, " D"], lengthscales: Float[Tensor, " D"]
     ) -> tuple[Float[Tensor, " D"], Float[Tensor, " D"]]:
-        """Lower and upper corner, within the unit cube: longer where f changes slowly, of the same volume."""
+        """Place the box in the unit cube: longer where f changes slowly, of the same volume before it is cut.
+
+        Args:
+            center: Best controller, [D].
+            lengthscales: Of the fitted kernel, [D].
+
+        Returns:
+            Lower and upper corner, each [D].
+        """
         weights = lengthscales / torch.exp(lengthscales.log().mean())
         return (center - weights * self.length / 2).clamp(0, 1), (center + weights * self.length / 2).clamp(
             0, 1

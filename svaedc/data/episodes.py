@@ -56,7 +56,13 @@ class Episodes:
         return len(self.rows)
 
     def require_sizes(self, controller_dim: int, observation_dim: int, time_steps: int) -> None:
-        """Raise ValueError unless the arrays have these sizes."""
+        """Raise ValueError unless the arrays have these sizes.
+
+        Args:
+            controller_dim: D of x.
+            observation_dim: Channels of xi.
+            time_steps: Steps of xi at the training stride.
+        """
         expected = ((controller_dim,), (observation_dim, time_steps))
         found = (self.x.shape[1:], self.xi.shape[1:])
         if found != expected:
@@ -66,13 +72,29 @@ class Episodes:
             )
 
     def gather(self, positions: Integer[np.ndarray, " batch"], device: torch.device) -> Batch:
-        """Episodes at `positions` of the selection, in storage order: a memory map is read forwards."""
+        """Read episodes in storage order, whatever the order of `positions`: a memory map is read forwards.
+
+        Args:
+            positions: In the selection, from 0, [batch].
+            device: Where the tensors go.
+
+        Returns:
+            The episodes, sorted by position.
+        """
         rows = self.rows[np.sort(positions)]
         columns = (torch.from_numpy(np.asarray(array[rows])) for array in (self.x, self.xi, self.bad, self.y))
         return Batch(*(column.to(device) for column in columns))
 
     def sample(self, count: int, rng: np.random.Generator) -> "Episodes":
-        """At most `count` of the episodes, drawn without replacement, in storage order."""
+        """Draw episodes without replacement.
+
+        Args:
+            count: At most so many.
+            rng: Draws them.
+
+        Returns:
+            A selection of the same arrays, in storage order.
+        """
         return replace(self, rows=self.rows[np.sort(rng.permutation(len(self))[:count])])
 
 
@@ -88,6 +110,9 @@ def measure_batches(
         episodes: At least one.
         device: Where batches and results are.
         measure: Tensors with one row per episode of a batch, by name.
+
+    Returns:
+        Tensors with one row per episode, by name.
     """
     results: dict[str, Tensor] = {}
     with torch.no_grad():
@@ -109,6 +134,9 @@ def split(episodes: Episodes, held_out: Integer[np.ndarray, " held_out"]) -> tup
     Args:
         episodes: The selection to split.
         held_out: Those of its rows that are held out; the cache knows them (`TrainingCache.held_out`).
+
+    Returns:
+        The rest for training, and the held-out ones, both selections of the same arrays.
 
     Raises:
         ValueError: A row is not in the selection.

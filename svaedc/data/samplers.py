@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float32, Int64, Integer
 
 STRATA: Final = 10
-"""Bins of equal width that balanced sampling shows equally often."""
+"""Balanced sampling shows so many bins of equal width equally often."""
 
 Order = Callable[[int, np.random.Generator], Int64[np.ndarray, " count"]]
-"""Positions of one pass over that many episodes."""
+"""It returns the positions of one pass over that many episodes."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,15 @@ ALONE = WorkerRank(rank=0, world=1)
 
 
 def uniform(count: int, rng: np.random.Generator) -> Int64[np.ndarray, " count"]:
-    """Every episode once, in random order."""
+    """Show every episode once, in random order.
+
+    Args:
+        count: Episodes.
+        rng: Draws the order.
+
+    Returns:
+        Positions from 0 to count - 1, [count].
+    """
     return rng.permutation(count)
 
 
@@ -114,6 +122,9 @@ def batches(
         seed: Determines the permutations, one per pass.
         updates: Update numbers, from 0 at the stage's start.
         order: Of a pass, drawn anew for each.
+
+    Yields:
+        Positions from 0 to count - 1, [batch], one array per update.
 
     Raises:
         ValueError: Fewer episodes than workers.

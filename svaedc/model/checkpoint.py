@@ -12,7 +12,7 @@ from svaedc.model.config import ModelConfig
 from svaedc.model.svae_dc import SvaeDc
 
 FILE: Final = "model.pt"
-"""Name of a trained model's checkpoint in its folder."""
+"""A trained model's checkpoint has this name in its folder."""
 
 FORMAT: Final = 1
 CPU: Final = torch.device("cpu")
@@ -43,7 +43,14 @@ def checkpoint_path(path: Path) -> Path:
 
 
 def load(path: Path, device: torch.device = CPU) -> tuple[SvaeDc, dict[str, Any]]:
-    """Model in evaluation mode and its metadata.
+    """Read a model and put it into evaluation mode.
+
+    Args:
+        path: File that `save` wrote.
+        device: Where the weights go.
+
+    Returns:
+        The model and its metadata.
 
     Raises:
         FileNotFoundError: There is no such file.
@@ -82,6 +89,10 @@ def require(path: Path, found: dict[str, Any], expected: dict[str, Any]) -> None
 def write(path: Path, content: dict[str, Any]) -> None:
     """Write plain values and tensors to `path` atomically: temporary file, fsync, rename.
 
+    Args:
+        path: File to write; its folder must exist.
+        content: What `torch.load(weights_only=True)` can read back.
+
     Raises:
         OSError: It cannot be written, for example on a full disk; an older file at `path` stays as it was.
     """
@@ -108,7 +119,14 @@ def write(path: Path, content: dict[str, Any]) -> None:
 
 
 def read(path: Path, device: torch.device = CPU) -> dict[str, Any]:
-    """Plain values and tensors written by `write`; no code in the file is run.
+    """Read what `write` wrote; no code in the file is run.
+
+    Args:
+        path: File to read.
+        device: Where tensors go.
+
+    Returns:
+        Plain values and tensors, by name.
 
     Raises:
         FileNotFoundError: There is no such file.

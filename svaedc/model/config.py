@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 KERNEL: Final = 4
-"""Width of every convolution (paper, section 5)."""
+"""Every convolution is so wide (paper, section 5)."""
 
 STRIDE: Final = 2
-"""Stride of every convolution (paper, section 5)."""
+"""Every convolution has this stride (paper, section 5)."""
 
 _CHOICES: Final = {
     "distribution": ("laplace", "gaussian"),
@@ -147,14 +147,30 @@ class ModelConfig:
 
 
 def encoded_length(steps: int, layers: int) -> int:
-    """Length of a sequence after `layers` convolutions without padding; below 1 when it is too short."""
+    """Count the steps that convolutions without padding leave.
+
+    Args:
+        steps: Length of the sequence.
+        layers: Convolutions of width `KERNEL` and stride `STRIDE`.
+
+    Returns:
+        Length afterwards; below 1 when the sequence is too short.
+    """
     for _ in range(layers):
         steps = (steps - KERNEL) // STRIDE + 1
     return steps
 
 
 def decoded_length(steps: int, layers: int) -> int:
-    """Length of a sequence after `layers` transposed convolutions."""
+    """Count the steps that transposed convolutions make.
+
+    Args:
+        steps: Length of the sequence, at least 1.
+        layers: Transposed convolutions of width `KERNEL` and stride `STRIDE`.
+
+    Returns:
+        Length afterwards.
+    """
     for _ in range(layers):
         steps = (steps - 1) * STRIDE + KERNEL
     return steps

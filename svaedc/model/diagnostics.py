@@ -13,7 +13,8 @@ from svaedc.model.svae_dc import SvaeDc
 
 _MEANS: Final = ("log_p_xi", "log_p_y", "minus_log_q", "kl", "log_p_xi_from_x", "log_p_y_from_x")
 ACTIVE_SHARE_OF_SPREAD: Final = 0.1
-"""Active: E[tau_d|x] spreads over controllers by at least this share of the aggregate posterior."""
+"""Dimension d is active if E[tau_d|x] spreads over controllers by at least this share of the aggregate
+posterior."""
 
 REMEDIES: Final = {  # in brackets the setting, as the section `train` names it
     "active_share": "lower the KL weight (kl_weight) or train longer (updates)",
@@ -35,6 +36,10 @@ def evaluate(model: SvaeDc, episodes: Episodes) -> dict[str, float]:
     the means over all elements in parts of the observation range; 1 is no better than the median. Dimensions
     that never leave their median are left out. A correlation is NaN when the true y does not vary and 0 when
     the predicted y does not; whatever is about y is NaN for an SVAE.
+
+    Args:
+        model: Put back into the mode it was in.
+        episodes: Held-out ones, at least two.
 
     Returns:
         `rec_norm`, `rec_raw`, `gen_norm`, `gen_raw`; `corr_y_rec`, `corr_y_gen` and the mean absolute errors

@@ -66,7 +66,16 @@ class Encoder(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> Diagonal:
-        """Posterior of the latent code given normalised trajectories."""
+        """Encode trajectories.
+
+        Args:
+            xi: Trajectories as `posterior_input` says, normalised, [batch, obs, time].
+            bad: 1 at each bad step, else 0, [batch, time]. The SVAE ignores it.
+            y: Badness of each episode in [0, 1], [batch]. The SVAE ignores it.
+
+        Returns:
+            Posterior of the latent code, event `[latent]`.
+        """
         if not self.sees_badness:
             return self.latent(self.convolutions(xi).flatten(1))
         features = self.convolutions(torch.cat([xi, bad.unsqueeze(1)], dim=1)).flatten(1)

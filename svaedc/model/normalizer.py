@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from torch import Tensor, nn
 
 SPREAD_FLOOR: Final = 1e-4
-"""Least spread of a dimension, in parts of its range: one that never moves must not divide by zero."""
+"""No dimension's spread is less, in parts of its range: one that never moves must not divide by zero."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,9 @@ def measure(
         rank: Principal directions to return; with fewer episodes the last ones are zero.
         rng: Starts the search for directions.
 
+    Returns:
+        Bounds, median, spread and directions.
+
     Raises:
         ValueError: No trajectories, bounds that do not fit, or trajectories that are not finite.
     """
@@ -70,6 +73,7 @@ def _principal_directions(
 ) -> Float32[np.ndarray, "rank features"]:
     """Leading principal directions by randomised subspace iteration, scaled to unit-variance coefficients."""
     directions = np.zeros((rank, rows.shape[1]), np.float32)
+    # Not torch.svd_lowrank: with niter=2 it misses 1.6 times the variance, with 3 it takes 1.3 times as long.
     subspace = rng.standard_normal((rows.shape[1], min(rank + 10, *rows.shape)), dtype=np.float32)
     for _ in range(3):
         subspace, _ = np.linalg.qr(rows.T @ (rows @ subspace))
@@ -120,4 +124,4 @@ class Normalizer(nn.Module):
 
 
 POSTERIOR_INPUTS: Final = {"scaled": Normalizer.scaled, "residual": Normalizer.residual}
-"""What q sees of a trajectory; residuals cut the held-out reconstruction error by a fifth."""
+"""q sees a trajectory in one of these forms; residuals cut the held-out reconstruction error by a fifth."""

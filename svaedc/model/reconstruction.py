@@ -11,7 +11,7 @@ from svaedc.data.episodes import Batch
 from svaedc.model.svae_dc import SvaeDc
 
 RANDOM: Final = 2
-"""Episodes drawn at random beside the best and the worst."""
+"""So many episodes are drawn at random beside the best and the worst."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,9 @@ def reconstructions(
         xi: Trajectory, SI units, at the model's training stride.
         bad: Whether each of its steps is bad, or the degree.
         y: Badness of the episode.
+
+    Returns:
+        The reconstructed episode, then the generated one.
     """
     one = Batch(*(torch.from_numpy(np.array(part, np.float32)[None]) for part in (x, xi, bad, y)))
     with torch.no_grad():
@@ -61,11 +64,14 @@ def _decode(model: SvaeDc, name: str, tau: torch.Tensor, psi: torch.Tensor) -> R
 
 
 def remarkable(f: Float[np.ndarray, " episodes"], rng: np.random.Generator) -> dict[str, int]:
-    """Positions of the episodes with the best and the worst objective, and of others drawn at random.
+    """Pick the episodes with the best and the worst objective, and others at random.
 
     Args:
         f: Objectives of held-out episodes, at least one.
         rng: Draws.
+
+    Returns:
+        Positions by name: `best`, `worst`, and up to `RANDOM` called `random 1` and so on.
     """
     chosen = {"best": int(np.argmax(f)), "worst": int(np.argmin(f))}
     others = np.setdiff1d(np.arange(len(f)), list(chosen.values()))

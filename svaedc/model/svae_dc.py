@@ -15,7 +15,7 @@ from svaedc.model.networks import HEADS, PRIORS, Badness, DenseHead, Encoder, Lo
 from svaedc.model.normalizer import POSTERIOR_INPUTS, Normalizer, measure
 
 STATISTICS_SAMPLE: Final = 2_000
-"""Trajectories that the decoder's starting point is measured on; more change it by less than one percent."""
+"""The decoder's start is measured on so many trajectories; more change it by less than one percent."""
 
 
 class ElboTerms(NamedTuple):
@@ -44,7 +44,7 @@ class SvaeDc(nn.Module):
     """
 
     def __init__(self, config: ModelConfig) -> None:
-        """Build untrained networks; `initialised` also measures the data they start from."""
+        """Build untrained networks; `initialized_model` also measures the data they start from."""
         super().__init__()
         self.config = config
         self.normaliser = Normalizer(config.observation_dim, config.time_steps)
@@ -60,7 +60,17 @@ class SvaeDc(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> ElboTerms:
-        """Terms of equation (elbo_dc_simple) for one draw of q; its last two terms are -KL in closed form."""
+        """Terms of equation (elbo_dc_simple) for one draw of q; its last two terms are -KL in closed form.
+
+        Args:
+            x: Controllers in the unit cube, [batch, D].
+            xi: Trajectories in SI units, [batch, obs, time].
+            bad: 1 at each bad step, else 0, [batch, time].
+            y: Badness of each episode in [0, 1], [batch].
+
+        Returns:
+            Each term of each episode, unweighted, [batch].
+        """
         q = self.posterior(xi, bad, y)
         tau, psi = self.split(q.rsample())
         return ElboTerms(
@@ -76,7 +86,17 @@ class SvaeDc(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> Float[Tensor, " batch"]:
-        """Unweighted evidence lower bound of each episode, equation (elbo_dc_simple)."""
+        """Unweighted evidence lower bound for one draw of q, equation (elbo_dc_simple).
+
+        Args:
+            x: Controllers in the unit cube, [batch, D].
+            xi: Trajectories in SI units, [batch, obs, time].
+            bad: 1 at each bad step, else 0, [batch, time].
+            y: Badness of each episode in [0, 1], [batch].
+
+        Returns:
+            The bound of each episode, [batch].
+        """
         log_p_xi, log_p_y, kl = self(x, xi, bad, y)
         return log_p_xi + log_p_y - kl
 
@@ -86,7 +106,16 @@ class SvaeDc(nn.Module):
         xi: Float[Tensor, "batch obs time"],
         y: Float[Tensor, " batch"],
     ) -> tuple[Float[Tensor, " batch"], Float[Tensor, " batch"]]:
-        """Terms log p(xi|tau) and log p(y|psi) at the means of p = p(tau, psi|x): what x alone tells."""
+        """Terms of the bound at the means of p(tau, psi|x): what x alone tells.
+
+        Args:
+            p: p(tau, psi|x), event `[latent]`.
+            xi: Trajectories in SI units, [batch, obs, time].
+            y: Badness of each episode in [0, 1], [batch].
+
+        Returns:
+            log p(xi|tau) and log p(y|psi) of each episode, [batch]; the second is 0 for an SVAE.
+        """
         tau, psi = self.split(p.loc)
         log_p_y = self.p_y(psi).log_prob(y) if self.config.has_psi else torch.zeros_like(y)
         return self.p_xi(tau).log_prob(self.normaliser.scaled(xi)), log_p_y
@@ -97,7 +126,16 @@ class SvaeDc(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> Diagonal:
-        """q(tau, psi | xi, y), event `[latent]`."""
+        """Encode episodes.
+
+        Args:
+            xi: Trajectories in SI units, [batch, obs, time].
+            bad: 1 at each bad step, else 0, [batch, time].
+            y: Badness of each episode in [0, 1], [batch].
+
+        Returns:
+            q(tau, psi | xi, y), event `[latent]`.
+        """
         seen = POSTERIOR_INPUTS[self.config.posterior_input](self.normaliser, xi)
         return self.posterior_network(seen, bad, y)
 
@@ -147,7 +185,16 @@ class SvaeDc(nn.Module):
         bad: Float[Tensor, "batch time"],
         y: Float[Tensor, " batch"],
     ) -> Float[Tensor, "batch obs time"]:
-        """Each trajectory, decoded from the mean of q(tau|xi, y), in SI units."""
+        """Decode each trajectory from the mean of q(tau|xi, y).
+
+        Args:
+            xi: Trajectories in SI units, [batch, obs, time].
+            bad: 1 at each bad step, else 0, [batch, time].
+            y: Badness of each episode in [0, 1], [batch].
+
+        Returns:
+            Trajectories in SI units, [batch, obs, time].
+        """
         tau, _ = self.split(self.posterior(xi, bad, y).loc)
         return self.normaliser.unscaled(self.p_xi(tau).loc)
 
@@ -155,13 +202,16 @@ class SvaeDc(nn.Module):
 def initialized_model(
     config: ModelConfig, training: Episodes, bounds: tuple[Sequence[float], Sequence[float]], seed: int
 ) -> SvaeDc:
-    """Untrained model whose buffers and decoder start from the training trajectories.
+    """Build a model whose buffers and decoder start from the training trajectories.
 
     Args:
         config: Sizes.
         training: Training episodes; a bounded sample of them is measured.
         bounds: Fixed lower and upper bounds of each observation (the setup's channels).
         seed: Determines the weights and the sample; torch's own generator is left as it was.
+
+    Returns:
+        The untrained model, on the CPU.
 
     Raises:
         ValueError: Episodes or bounds do not fit `config`.

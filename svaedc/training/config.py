@@ -52,8 +52,8 @@ WEIGHTINGS: Final = {
     "hybrid": Weighting(kl=1.0, y=1.0, warm_up=0.1, generation=1.0),
     "balanced": Weighting(kl=1.0, y=100.0, warm_up=0.3, generation=1.0),
 }
-"""`paper`: the paper's equation. `hybrid`: generation from x counts as much as reconstruction. `balanced`:
-that, and psi is kept alive where y drowns in the elements of xi."""
+"""`paper` is the paper's equation. In `hybrid`, generation from x counts as much as reconstruction.
+`balanced` does that, and keeps psi alive where y drowns in the elements of xi."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,15 @@ class TrainingSettings:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
 
     def with_updates(self, joint: int, prior: int) -> "TrainingSettings":
-        """The same settings with other budgets; `cosine` ends with them, `halving` goes by updates alone."""
+        """Change the budgets alone; `cosine` ends with them, `halving` goes by updates alone.
+
+        Args:
+            joint: Updates of stage one.
+            prior: Updates of stage two; 0 leaves it out.
+
+        Returns:
+            New settings; these stay as they are.
+        """
         return replace(
             self, joint=replace(self.joint, updates=joint), prior=replace(self.prior, updates=prior)
         )
@@ -144,7 +152,15 @@ class TrainingSettings:
 
 
 def optimizer_of(module: nn.Module, settings: StageSettings) -> torch.optim.Optimizer:
-    """New optimiser over the parameters of `module`."""
+    """Make the optimiser of a stage.
+
+    Args:
+        module: What it optimises.
+        settings: Name, learning rate and weight decay.
+
+    Returns:
+        A new optimiser over all parameters of `module`.
+    """
     return OPTIMIZERS[settings.optimiser](module, settings)
 
 

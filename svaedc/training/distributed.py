@@ -11,8 +11,8 @@ from torch import nn
 from svaedc.data.samplers import ALONE, WorkerRank
 
 PRECISIONS: Final = {"float32": torch.float32, "bfloat16": torch.bfloat16}
-"""Of matrix products and convolutions. Weights, densities and sums are float32 in either, and bfloat16 has
-float32's range, so that no loss needs scaling."""
+"""Matrix products and convolutions have one of these. Weights, densities and sums are float32 in either, and
+bfloat16 has float32's range, so that no loss needs scaling."""
 
 
 def same_module(module: nn.Module) -> nn.Module:
@@ -31,7 +31,7 @@ class DistributedContext:
 
     Attributes:
         shard: This worker among those that train together.
-        parallelise: Wraps what each stage optimises, for example in DistributedDataParallel.
+        parallelize: Wraps what each stage optimises, for example in DistributedDataParallel.
         agree: Rank 0's decision, on every rank; asked by all ranks at the same points.
         precision: `float32`, or `bfloat16` for mixed precision, which pays on a GPU.
     """

@@ -20,7 +20,7 @@ from svaedc.training.distributed import SINGLE_PROCESS, DistributedContext
 from svaedc.training.objectives import JointStage, PriorStage, Stage
 
 TrainingState = dict[str, Any]
-"""Plain values and tensors for `torch.save`; `torch.load(weights_only=True)` reads them back."""
+"""It holds plain values and tensors for `torch.save`; `torch.load(weights_only=True)` reads them back."""
 
 STAGES: Final = ("joint", "prior")
 
@@ -179,6 +179,10 @@ class Loop:
 def require_settings(state: TrainingState, settings: TrainingSettings) -> None:
     """Refuse to go on from a state of other settings.
 
+    Args:
+        state: `EpochReport.state` of an earlier run.
+        settings: Those to go on with.
+
     Raises:
         ValueError: A setting differs; it is named with both values.
     """
@@ -217,7 +221,7 @@ def fit(
     so an interrupted run that resumes ends with the same bits as one that was not.
 
     Args:
-        model: From `initialised`.
+        model: From `initialized_model`.
         training: All workers' training episodes; the context's shard selects this worker's.
         held_out: Measured after every epoch; they also select stage two's network.
         settings: The run.
@@ -225,6 +229,9 @@ def fit(
             finished run yields nothing more.
         order: Of the training episodes in each pass.
         context: Who trains with this process, and in which precision.
+
+    Yields:
+        A report after each epoch that is left.
 
     Raises:
         ValueError: `resume` comes from other settings, or there are too few episodes.

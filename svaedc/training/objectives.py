@@ -16,7 +16,7 @@ from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.config import StageSettings, TrainingSettings, Weighting
 
 Terms = dict[str, Float[Tensor, ""]]
-"""Means over a batch, unweighted, by name."""
+"""It holds means over a batch, unweighted, by name."""
 
 
 class Stage(ABC):
@@ -43,9 +43,14 @@ class Stage(ABC):
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
     ) -> tuple[Float[Tensor, ""], Terms]:
-        """Loss of the training episodes at `positions`, and the unweighted terms behind it.
+        """Compute the loss of some training episodes.
 
-        `wrapped` is `module`, possibly wrapped for distributed training.
+        Args:
+            wrapped: `module`, possibly wrapped for distributed training.
+            positions: Of the training episodes, [batch].
+
+        Returns:
+            The loss, and the unweighted terms behind it.
         """
 
     @abstractmethod
@@ -127,7 +132,15 @@ class JointStage(Stage):
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
     ) -> tuple[Float[Tensor, ""], Terms]:
-        """Weighted negative bound per element of xi."""
+        """Compute the weighted negative bound per element of xi.
+
+        Args:
+            wrapped: `module`, possibly wrapped for distributed training.
+            positions: Of the training episodes, [batch].
+
+        Returns:
+            The loss, and the unweighted terms behind it.
+        """
         terms = wrapped(self._training.gather(positions, next(wrapped.parameters()).device))
         return self._weighted(terms, self._weighting.kl_at(self.progress)), terms
 
@@ -159,7 +172,15 @@ class PriorRefit(nn.Module):
         self._generation_terms = model.generation_terms
 
     def forward(self, batch: Batch, q: Diagonal) -> Terms:
-        """Mean of each term over a batch whose posteriors are `q`."""
+        """Average each term over a batch.
+
+        Args:
+            batch: Episodes.
+            q: Their posteriors, row by row.
+
+        Returns:
+            Means by name.
+        """
         p = self.network(batch.x)
         terms = {"kl": kl_divergence(q, p).mean()}
         return terms | _from_x(self._generation_terms(p, batch.xi, batch.y)) if self.generates else terms
@@ -189,7 +210,15 @@ class PriorStage(Stage):
     def loss(
         self, wrapped: nn.Module, positions: Integer[np.ndarray, " batch"]
     ) -> tuple[Float[Tensor, ""], Terms]:
-        """Mean KL of the batch, and what generation adds to it."""
+        """Compute the mean KL of the batch, and what generation adds to it.
+
+        Args:
+            wrapped: `module`, possibly wrapped for distributed training.
+            positions: Of the training episodes, [batch].
+
+        Returns:
+            The loss, and the unweighted terms behind it.
+        """
         ordered, q = np.sort(positions), self._posteriors
         batch = self._training.gather(ordered, q.loc.device)
         rows = torch.from_numpy(ordered).to(q.loc.device)
@@ -226,7 +255,15 @@ def _parameters(network: nn.Module | None) -> list[nn.Parameter]:
 
 
 def posteriors(model: SvaeDc, episodes: Episodes) -> Diagonal:
-    """Posteriors q(tau, psi|xi, y) of all episodes, in evaluation mode."""
+    """Encode all episodes, in evaluation mode, in which the model stays.
+
+    Args:
+        model: Its device is used.
+        episodes: At least one.
+
+    Returns:
+        q(tau, psi|xi, y) of each episode, in storage order, without gradients.
+    """
 
     def encoded(batch: Batch) -> dict[str, Tensor]:
         q = model.posterior(batch.xi, batch.bad, batch.y)

@@ -109,15 +109,15 @@ def usual_stride(name: str) -> int:
 
 
 KEPT: Final = "preset"
-"""Leaves a choice to the preset."""
+"""This value leaves a choice to the preset."""
 
 LATENT_SIZES: Final = {
     "3x3": {"path_length": 3, "tau_dim": 3, "channels": (32, 64, 128)},
     "5x6": {"path_length": 5, "tau_dim": 6, "channels": (64, 128, 256)},
     "15x12": {"path_length": 15, "tau_dim": 12, "channels": (256, 512, 1024)},
 }
-"""K x tau_dim and hidden sizes: 9-D everywhere in the paper but for its larger 30-D space (hidden 256) and a
-180-D one (hidden up to 1024)."""
+"""These are K x tau_dim and hidden sizes: the paper has 9-D everywhere but for its larger 30-D space
+(hidden 256) and a 180-D one (hidden up to 1024)."""
 
 
 def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
@@ -127,6 +127,9 @@ def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
         preset: Model and training.
         changes: Values by name; `VARIATIONS` has the names, and `preset` changes nothing. They are applied in
             the order of `VARIATIONS`, whatever their own: what is narrower comes after what holds it.
+
+    Returns:
+        The changed preset; `preset` stays as it is.
 
     Raises:
         LookupError: There is no such choice, or it has no such value; the nearest is named.
