@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,7 @@ from svaedc.bo.history import History
 from workers.hardware.driver import RobotDriver, RobotFault
 
 
+@runtime_checkable
 class Proposer(Protocol):
     """Where controllers come from; a pure function of the campaign's identity and its arguments."""
 

@@ -88,7 +88,7 @@ def table(recipe: Recipe, summaries: Mapping[str, Summary], initial: int) -> Tab
     return Table(
         recipe,
         tuple(
-            Entry(claim, evidence.measure, evidence.found(summaries, initial))
+            Entry(claim, evidence.measure, evidence.finding(summaries, initial))
             for claim in recipe.claims
             for evidence in claim.evidence
         ),

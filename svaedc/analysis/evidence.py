@@ -47,7 +47,7 @@ class Evidence(Protocol):
         """What the number is, in words."""
         ...
 
-    def found(self, panels: Panels, initial: int) -> Finding:
+    def finding(self, panels: Panels, initial: int) -> Finding:
         """Measure the number, and judge the claim by it.
 
         Args:
@@ -83,7 +83,7 @@ class Successes:
         """Whose share, and of what."""
         return f"{self.method}, share of {self.among} with a success"
 
-    def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
+    def finding(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
         """Holds if the measured share lies in the range; its interval decides nothing.
 
         Args:
@@ -128,7 +128,7 @@ class MedianGap:
         limit = f" ≤ {self.high:g}" if self.high < math.inf else f" ≥ {self.low:g}"
         return f"{self.method}, median gap to {self.optimum:g}{limit}, best after {self.after}"
 
-    def found(self, panels: Panels, initial: int) -> Finding:
+    def finding(self, panels: Panels, initial: int) -> Finding:
         """Holds if the median lies in the range; it has no interval.
 
         Args:
@@ -136,12 +136,14 @@ class MedianGap:
             initial: Shared random trials that every run began with.
 
         Returns:
-            The gap, or `UNKNOWN`, also where a run has fewer trials.
+            The gap, or `UNKNOWN`, also where a run has fewer trials or none that was measured.
         """
         method, index = _method(panels.get(self.panel), self.method), initial + self.after - 1
         if method is None or index >= len(method.median_best):
             return UNKNOWN
         gap = self.optimum - method.median_best[index]
+        if math.isnan(gap):
+            return UNKNOWN
         verdict: Verdict = "holds" if self.low <= gap <= self.high else "does not hold"
         return Finding(Estimate(gap, math.nan, math.nan), method.runs, verdict)
 
@@ -165,7 +167,7 @@ class Steadier:
         """Ratio of widths."""
         return f"{self.method}, width of the last interval, {self.panel} / {self.than}"
 
-    def found(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
+    def finding(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
         """Holds if the interval of the ratio, over equal numbers of runs, is below 1.
 
         Args:

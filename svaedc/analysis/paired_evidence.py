@@ -30,7 +30,7 @@ class _Paired(ABC):
         """Method minus baseline, and what that is said to be."""
         return f"{self.method} − {self.baseline}{self._said()}, best after {self.after}"
 
-    def found(self, panels: Panels, initial: int) -> Finding:
+    def finding(self, panels: Panels, initial: int) -> Finding:
         """The paired difference; open where one run has no interval."""
         difference = _difference(panels.get(self.panel), self.method, self.baseline)
         index = initial + self.after - 1

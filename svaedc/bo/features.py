@@ -13,7 +13,7 @@ Embedding = Callable[[Tensor, Tensor], Tensor]
 """It returns phi(x) of tau [..., k] and y [...]."""
 
 _LEAST_SCALE = 0.1
-"""A latent dimension is collapsed below this share of the widest one (SPEC: active dimensions); whitening
+"""A latent dimension is collapsed below this share of the widest one; whitening
 may not blow such noise up to the size of a signal."""
 
 

@@ -155,9 +155,6 @@ def _maximize_likelihood(model: SingleTaskGP) -> None:
         raise ModelFittingError(f"the marginal likelihood is {result.fval}")
 
 
-_log = logging.getLogger(__name__)
-
-
 def default(x: Float[Tensor, "n D"], f: Float[Tensor, " n"]) -> GaussianProcess:
     """BoTorch's default process: SE with dimension-scaled priors (Hvarfner et al., ICML 2024).
 

@@ -203,9 +203,6 @@ def _flat(settings: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-__all__ = ["EpochReport", "TrainingState", "fit", "require_settings"]
-
-
 def fit(
     model: SvaeDc,
     training: Episodes,

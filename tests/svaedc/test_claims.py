@@ -73,11 +73,11 @@ PANELS = {
 )
 def test_a_verdict_is_what_the_comparison_was_made_to_say(evidence, verdict):
     assert isinstance(evidence, Evidence)
-    assert evidence.found(PANELS, INITIAL).verdict == verdict
+    assert evidence.finding(PANELS, INITIAL).verdict == verdict
 
 
 def test_a_gain_is_the_mean_of_the_paired_differences_with_its_interval():
-    found = Gain("left", "good", "bad", 1).found(PANELS, INITIAL)
+    found = Gain("left", "good", "bad", 1).finding(PANELS, INITIAL)
     assert found.runs == 8
     assert found.value.mean == pytest.approx(np.mean(0.4 + 2 * NOISE))
     assert found.value.low < 0.4 < found.value.high
@@ -85,14 +85,14 @@ def test_a_gain_is_the_mean_of_the_paired_differences_with_its_interval():
 
 def test_the_shares_are_those_of_runs_and_of_suggested_trials():
     runs = panel({"half": [1.0, 1.0, 0.0, 0.0]})
-    among_runs = Successes("it", "half", "runs", 0.5, 0.5).found({"it": runs}, INITIAL)
-    among_trials = Successes("it", "half", "trials", 0.5, 0.5).found({"it": runs}, INITIAL)
+    among_runs = Successes("it", "half", "runs", 0.5, 0.5).finding({"it": runs}, INITIAL)
+    among_trials = Successes("it", "half", "trials", 0.5, 0.5).finding({"it": runs}, INITIAL)
     assert (among_runs.value.mean, among_trials.value.mean) == (0.5, 0.5)
     assert among_runs.runs == 4
 
 
 def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_with_the_interval_of_a_ratio():
-    found = Steadier("tight", "left", "good").found(PANELS, INITIAL)
+    found = Steadier("tight", "left", "good").finding(PANELS, INITIAL)
     assert found.value.mean == pytest.approx(0.25)
     # The table of F for 7 and 7 degrees of freedom: 3.787 is exceeded by 5 %.
     assert found.value.high == pytest.approx(0.25 * math.sqrt(3.787), rel=1e-3)
@@ -101,16 +101,16 @@ def test_a_quarter_of_the_width_is_a_ratio_of_a_quarter_with_the_interval_of_a_r
 
 def test_the_gap_is_that_of_the_median_run_and_not_of_the_mean():
     runs = panel({"mostly": [0.5, 0.5, 10.0]})
-    found = MedianGap("it", "mostly", 12.0, 3, low=1.0).found({"it": runs}, INITIAL)
+    found = MedianGap("it", "mostly", 12.0, 3, low=1.0).finding({"it": runs}, INITIAL)
     assert (found.value.mean, found.runs, found.verdict) == (11.5, 3, "holds")
-    before_any = MedianGap("it", "mostly", 12.0, 0, low=1.0).found({"it": runs}, INITIAL)
+    before_any = MedianGap("it", "mostly", 12.0, 0, low=1.0).finding({"it": runs}, INITIAL)
     assert before_any.value.mean == 13.0
 
 
 def test_one_run_leaves_a_gain_open():
     alone = {"it": panel({"good": [0.9], "bad": [0.1]})}
-    assert Gain("it", "good", "bad", 3).found(alone, INITIAL).verdict == "open"
-    assert Like("it", "good", "bad", 3).found(alone, INITIAL).verdict == "open"
+    assert Gain("it", "good", "bad", 3).finding(alone, INITIAL).verdict == "open"
+    assert Like("it", "good", "bad", 3).finding(alone, INITIAL).verdict == "open"
 
 
 def test_every_measure_says_what_it_is_about():
