@@ -1,5 +1,6 @@
 """What one run of Bayesian optimisation is made from; comparison, campaign and notebook all get it here."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,15 +12,18 @@ from svaedc.bo import methods
 from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents
+from svaedc.bo.loop import Outcome
 from svaedc.bo.methods import Method
 from svaedc.bo.online import Adjustable
 from svaedc.model.svae_dc import SvaeDc
+from workers.environments.environment import Environment
 from workers.randomness import Stream, generator
+from workers.rollout import rollout
 from workers.setups import Setup
 
 DRAWS: Final = 2
-"""The version of how controllers are drawn: 1 drew in float64 and rounded, as campaigns of svaedc 0.1.0 did; 2
-draws in float32, as comparisons always did. The two are different controllers of the same seed."""
+"""The version of how controllers are drawn. 1 drew in float64 and rounded, as campaigns of svaedc 0.1.0 did,
+2 draws in float32, as comparisons always did. The two give different controllers of the same seed."""
 
 
 @dataclass(frozen=True)
@@ -85,3 +89,26 @@ class Optimization:
         if self.draws == 1:
             return rng.random(shape).astype(np.float32)
         return rng.random(shape, dtype=np.float32)
+
+
+def hidden_robot(
+    setup: Setup, environment: Environment, gap: str, seed: int
+) -> Callable[[np.ndarray], Outcome]:
+    """What one run maximises: the setup under hidden physics, drawn once from the ranges of a gap.
+
+    Args:
+        setup: whose controllers are tried.
+        environment: in which; opened by the setup.
+        gap: level of the hidden physics, or its ranges written out.
+        seed: of the draw, at least 0.
+
+    Returns:
+        A function of a controller, [D] in the unit cube.
+    """
+    physics = setup.gap(gap).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
+
+    def evaluate(x: np.ndarray) -> Outcome:
+        episode = rollout(setup, environment, x, physics)
+        return Outcome(f=episode.f, y=episode.y, success=episode.f > setup.success, stop=episode.stop)
+
+    return evaluate

@@ -61,14 +61,18 @@ def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":
 def services(
     settings: "Settings", address: str | None, parts: "tuple[Part, ...]" = ("dashboard",)
 ) -> Iterator[tuple["Session", "Tracker"]]:
-    """The tracker, whose store must exist before anything else starts, and the Ray session."""
-    from cluster.runtime.session import connect
-    from cluster.runtime.signals import interruptible
-    from cluster.tracking import open_tracker
+    """The services of a command that may be interrupted; see `cluster.services`.
 
-    store = settings.tracking.uri.removeprefix("sqlite:///")
-    if store != settings.tracking.uri:
-        durable(Path(store))
-    tracker = open_tracker(settings.tracking)
-    with interruptible(), connect(settings.ray, address, parts) as session:
-        yield session, tracker
+    Args:
+        settings: of the command.
+        address: of a running cluster; None to start one here.
+        parts: of a cluster that is started here.
+
+    Yields:
+        The connection to Ray, and the tracker.
+    """
+    from cluster.runtime.signals import interruptible
+    from cluster.services import services as opened
+
+    with interruptible(), opened(settings, address, parts) as both:
+        yield both

@@ -2,7 +2,7 @@
 
 import errno
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,12 @@ from ray import tune
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.models import shared_model
-from cluster.optimization import Optimization
+from cluster.optimization import Optimization, hidden_robot
 from svaedc.bo import methods
-from svaedc.bo.loop import Outcome, Trial, trials
+from svaedc.bo.loop import Trial, trials
 from workers import setups
 from workers.environments.environment import Environment
 from workers.hardware import robots
-from workers.randomness import Stream, generator
-from workers.rollout import rollout
 from workers.setups import Setup
 
 STEP_SECONDS = 1.0
@@ -87,7 +85,7 @@ class ComparisonJob:
         planned = self.optimization(key, setup)
         for trial in trials(
             planned.build(),
-            evaluation(setup, environment, self.gap, key.run),
+            hidden_robot(setup, environment, self.gap, key.run),
             np.stack([planned.initial(index) for index in range(self.initial)]),
             self.trials,
             planned.rng,
@@ -111,17 +109,6 @@ class ComparisonJob:
         twin = robots.stands_in_for(self.setup)
         model = shared_model(Path(self.model), self.setup, twin) if needs_model else None
         return Optimization(setup, key.method, key.run, self.pool_size, model)
-
-
-def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:
-    """What one run maximises: the setup under hidden physics, drawn once from the gap's ranges."""
-    physics = setup.gap(gap).draw(generator(run, Stream.HIDDEN_PHYSICS, 0))
-
-    def evaluate(x: np.ndarray) -> Outcome:
-        episode = rollout(setup, environment, x, physics)
-        return Outcome(f=episode.f, y=episode.y, success=episode.f > setup.success, stop=episode.stop)
-
-    return evaluate
 
 
 class RunTrainable(tune.Trainable):

@@ -1,0 +1,257 @@
+"""The commands as functions, for notebooks and scripts; `import svaedc` offers them by these names.
+
+Each function does what the command of its name does, with the same settings and the same records: a dataset,
+model or comparison may be begun by one and continued by the other.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cluster.comparison import compare as comparison_driver
+from cluster.comparison.compare import Comparison
+from cluster.comparison.plan import Grid, plan_comparison
+from cluster.config import Settings
+from cluster.datasets import collect as collection_driver
+from cluster.datasets.plan import plan_collection, say_complete
+from cluster.errors import UserError
+from cluster.inputs import dataset_location, durable_dataset, require_working_setup, setup_of
+from cluster.models import TrainedModel
+from cluster.optimization import hidden_robot
+from cluster.services import services
+from cluster.settings import load_settings
+from cluster.training import train as training_driver
+from svaedc.bo import methods as bo_methods
+from svaedc.bo.loop import Outcome
+from svaedc.model import checkpoint
+from workers.dataset import folder as dataset_folder
+from workers.dataset.folder import Dataset
+from workers.setups import SETUPS, Setup
+
+METHODS = ("random", "screened-random", "se", "svae", "svae-dc")
+"""What `compare` compares unless it is told otherwise."""
+AS_CONFIGURED: Mapping[str, Any] = {}
+"""No setting is changed."""
+
+
+def setup_names() -> tuple[str, ...]:
+    """The setups that ship; the name of an importable module that offers `setup()` is one as well."""
+    return tuple(SETUPS)
+
+
+def load_setup(name: str) -> Setup:
+    """The setup of that name.
+
+    Raises:
+        UsageError: there is none; the message names the nearest.
+    """
+    return setup_of(name)
+
+
+def method_names() -> tuple[str, ...]:
+    """The methods that `compare` and `Optimizer` know."""
+    return bo_methods.names()
+
+
+def open_dataset(dataset: Path | str) -> Dataset:
+    """A dataset that was collected.
+
+    Args:
+        dataset: its folder, or `s3://bucket/prefix`.
+
+    Returns:
+        The dataset; `read(shard)` gives the episodes of one of its `shards()` as arrays.
+
+    Raises:
+        UserError: there is none.
+    """
+    try:
+        return dataset_folder.open_dataset(dataset_location(str(dataset)))
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+
+
+def load_model(model: Path | str) -> TrainedModel:
+    """A model that was trained, in evaluation mode, with its metadata.
+
+    Args:
+        model: its folder, or the checkpoint in it.
+
+    Returns:
+        The model, its file and its metadata; `model.latent_means(x)` gives latent paths and badness of x.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    path = checkpoint.checkpoint_path(Path(model))
+    try:
+        network, metadata = checkpoint.load(path)
+    except (FileNotFoundError, ValueError) as error:
+        raise UserError(f"cannot use the model: {error}") from error
+    return TrainedModel(path, network.requires_grad_(requires_grad=False), metadata)
+
+
+def collect(
+    setup: Setup | str,
+    dataset: Path | str,
+    episodes: int,
+    *,
+    seed: int = 0,
+    repeats: int = 1,
+    settings: Mapping[str, Any] = AS_CONFIGURED,
+    address: str | None = None,
+) -> Dataset:
+    """Roll out random controllers into a dataset; what it holds already is kept.
+
+    Args:
+        setup: whose controllers, or its name. Rollout processes import it by its name.
+        dataset: its folder, or `s3://bucket/prefix`.
+        episodes: that it shall hold.
+        seed: of all controllers and physics.
+        repeats: episodes of each controller, each under other physics.
+        settings: any of `ray_config.yaml`, by `section.key`.
+        address: of a running Ray cluster; None starts one here.
+
+    Returns:
+        The dataset.
+
+    Raises:
+        UserError: as `svaedc collect` says it.
+    """
+    chosen, known = require_working_setup(_setup(setup), seed), _settings(settings)
+    plan = plan_collection(
+        setup=chosen,
+        episodes=episodes,
+        folder=durable_dataset(str(dataset)),
+        seed=seed,
+        repeats=repeats,
+        settings=known.collect,
+    )
+    if not plan.missing:
+        say_complete(plan)
+        return plan.dataset
+    with services(known, address, parts=()) as (session, tracker):
+        return collection_driver.collect(plan, known.collect, session, tracker)
+
+
+def train(
+    dataset: Path | str,
+    model: Path | str,
+    *,
+    preset: str = "compact",
+    seed: int = 0,
+    settings: Mapping[str, Any] = AS_CONFIGURED,
+    address: str | None = None,
+) -> TrainedModel:
+    """Fit the SVAE-DC to a dataset; an interrupted training goes on.
+
+    Args:
+        dataset: its folder, or `s3://bucket/prefix`.
+        model: folder of the model.
+        preset: `compact` (two CPU cores, minutes) or `paper` (a GPU, hours).
+        seed: of every draw.
+        settings: any of `ray_config.yaml`, by `section.key`.
+        address: of a running Ray cluster; None starts one here.
+
+    Returns:
+        The model.
+
+    Raises:
+        UserError: as `svaedc train` says it.
+    """
+    known = _settings(settings)
+    with services(known, address) as (session, tracker):
+        path = training_driver.train(
+            folder=durable_dataset(str(dataset)),
+            model=Path(model).absolute(),
+            preset=preset,
+            seed=seed,
+            settings=known.train,
+            session=session,
+            tracker=tracker,
+        )
+    return load_model(path)
+
+
+def compare(
+    setup: Setup | str,
+    out: Path | str,
+    *,
+    methods: tuple[str, ...] = METHODS,
+    model: Path | str | None = None,
+    runs: int = 50,
+    trials: int = 20,
+    gap: str = "paper",
+    seed: int = 0,
+    settings: Mapping[str, Any] = AS_CONFIGURED,
+    address: str | None = None,
+) -> Comparison:
+    """Run methods side by side in simulation; what the folder holds already is kept.
+
+    Args:
+        setup: whose controllers, or its name. Processes that run trials import it by its name.
+        out: folder of the results.
+        methods: names; see `method_names`.
+        model: folder of a model of this setup; None for methods that need none.
+        runs: seeds of each method.
+        trials: suggested in each run, after the random ones.
+        gap: hidden physics: `paper`, `training`, `wide`, or ranges written out.
+        seed: of the first run.
+        settings: any of `ray_config.yaml`, by `section.key`.
+        address: of a running Ray cluster; None starts one here.
+
+    Returns:
+        The summary of all runs in the folder, and the address of the MLflow run.
+
+    Raises:
+        UserError: as `svaedc compare` says it.
+    """
+    known = _settings(settings)
+    plan = plan_comparison(
+        setup=_setup(setup),
+        grid=Grid(methods, seed, runs),
+        trials=trials,
+        gap=gap,
+        model=None if model is None else Path(model).absolute(),
+        folder=Path(out).absolute(),
+        settings=known.compare,
+    )
+    with services(known, address) as (session, tracker):
+        return comparison_driver.compare(plan, session, tracker)
+
+
+@contextmanager
+def simulated_robot(setup: Setup | str, gap: str = "paper", seed: int = 0) -> Iterator[Any]:
+    """A robot to try controllers on: the setup under hidden physics that are drawn once.
+
+    Args:
+        setup: whose controllers, or its name.
+        gap: hidden physics: `paper`, `training`, `wide`, or ranges written out.
+        seed: of the draw; that of a run of `compare` gives its physics.
+
+    Yields:
+        A function of a controller, [D] in the unit cube, that returns its `f`, `y`, `success` and `stop`.
+    """
+    chosen = _setup(setup)
+    with chosen.open() as environment:
+        evaluate = hidden_robot(chosen, environment, gap, seed)
+
+        def evaluate_array(x: np.ndarray) -> Outcome:
+            return evaluate(np.asarray(x, dtype=np.float32))
+
+        yield evaluate_array
+
+
+def _setup(setup: Setup | str) -> Setup:
+    return setup_of(setup) if isinstance(setup, str) else setup
+
+
+def _settings(changes: Mapping[str, Any]) -> Settings:
+    """The settings of the working directory's file, changed."""
+    return load_settings(
+        None, [f"{name}={json.dumps(value, default=str)}" for name, value in changes.items()]
+    )
