@@ -1,8 +1,8 @@
 """SVAE-DC: latent paths of trajectories, learnt in simulation, and Bayesian optimisation on top of them.
 
 This is the front door: `import svaedc` offers everything that a study needs, and loads each part when it is
-first used. What needs both rollouts and models lives in the shell, `cluster`; here is only a table of where. The
-rooms of this package import neither the shell nor `workers`, and nothing in them uses this table.
+first used. What needs both rollouts and models lives in the shell, `cluster`; here is only a table of where.
+The rooms of this package import neither the shell nor `workers`, and nothing in them uses this table.
 
     >>> import svaedc
     >>> optimizer = svaedc.Optimizer("quadratic-30d", "random")

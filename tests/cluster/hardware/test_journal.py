@@ -14,7 +14,8 @@ from cluster.hardware.database import JournalCorrupt, JournalError
 from cluster.hardware.events import replay
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import IllegalTransition, Journal, KeyReused, RobotTaken
-from cluster.hardware.states import LEGAL, Approval, IdentityMismatch, State
+from cluster.hardware.identity import IdentityMismatch
+from cluster.hardware.states import LEGAL, Approval, , State
 from tests.cluster.hardware.desk import IDENTITY, carry_out, now
 
 X = np.array([0.1, 1.0 / 3.0, 5e-324])
