@@ -26,9 +26,9 @@ from cluster.comparison.plan import Grid, plan_comparison, usable
 from cluster.comparison.records import RunKey, append, read_trials
 from cluster.comparison.tracking import begin
 from cluster.comparison.tune import BestSoFar
-from cluster.comparison.worker import evaluation
 from cluster.config import CompareSettings, TrackingSettings
 from cluster.errors import UsageError, UserError
+from cluster.optimization import hidden_robot
 from cluster.tracking import open_tracker
 from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
@@ -262,7 +262,7 @@ def test_the_hidden_physics_belong_to_the_run_and_to_the_gap():
     with setup.open() as environment:
 
         def f(gap: str, run: int) -> float:
-            return evaluation(setup, environment, gap, run)(x).f
+            return hidden_robot(setup, environment, gap, run)(x).f
 
         gaps = ("object1_mass=1.9:2.1", "paper", "training", "wide")
         found = [f(gap, run) for gap in gaps for run in (1000, 1001)]
