@@ -212,7 +212,7 @@ def read(path: Location, identity: Identity) -> Columns:
         y=table["y"].to_numpy(),
         f=table["f"].to_numpy(),
         stop=tuple(table["stop"].to_pylist()),
-        physics={name: column.to_numpy() for name, column in _fields(table["physics"])},
+        physics={name: column.to_numpy() for name, column in _fields(table, identity)},
     )
 
 
@@ -277,7 +277,9 @@ def _dense(column: pa.ChunkedArray, shape: tuple[int, ...]) -> Any:
     return values.to_numpy().reshape(len(column), *shape)
 
 
-def _fields(column: pa.ChunkedArray) -> Iterator[tuple[str, pa.ChunkedArray]]:
-    """The numbers of a struct by name; what `pyarrow.compute` does as well takes long to import."""
-    names = [column.type.field(index).name for index in range(column.type.num_fields)]
-    return zip(names, column.flatten(), strict=True)
+def _fields(table: pa.Table, identity: Identity) -> Iterator[tuple[str, pa.ChunkedArray]]:
+    """The physics by name; what `pyarrow.compute` does as well takes long to import."""
+    if identity.physics:
+        struct = table["physics"]
+        names = [struct.type.field(index).name for index in range(struct.type.num_fields)]
+        yield from zip(names, struct.flatten(), strict=True)
