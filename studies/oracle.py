@@ -93,7 +93,7 @@ def codes(model: SvaeDc, chosen: Episodes, share: float) -> dict[str, Tensor]:
         x, xi, bad, y = batch
         code = (1 - share) * model.prior(x).loc + share * model.posterior(xi, bad, y).loc
         tau, psi = model.split(code)
-        scaled = model.normaliser.scaled(xi)
+        scaled = model.normaliser.normalize(xi)
         return {
             "tau": tau,
             "y": model.badness_at(psi).clamp(0, 1),

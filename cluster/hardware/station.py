@@ -11,7 +11,7 @@ IDLE_SECONDS = 60.0
 """A driver asks for the next trial within this; one that does not has died and lost the robot."""
 
 
-class RobotTaken(UserError):  # noqa: N818 - names the state of the robot
+class RobotBusy(UserError):  # noqa: N818 - names the state of the robot
     """Another campaign holds the robot."""
 
 
@@ -26,11 +26,11 @@ class Station:
         """Takes the place, or goes on with the same plan.
 
         Raises:
-            RobotTaken: when another campaign's driver is at work here.
+            RobotBusy: when another campaign's driver is at work here.
         """
         if self._executor is not None and not _is_same(self._executor.plan, plan):
             if monotonic() - self._asked < IDLE_SECONDS:
-                raise RobotTaken(
+                raise RobotBusy(
                     f"robot {plan.identity.robot!r} is held by the campaign in {self._executor.plan.folder}; "
                     f"wait until it has ended, or {IDLE_SECONDS:.0f} s after its command was ended"
                 )
@@ -43,10 +43,10 @@ class Station:
         """Goes on with a campaign up to the end of one trial; see `Executor.advance`.
 
         Raises:
-            RobotTaken: when the place has been handed on to another campaign.
+            RobotBusy: when the place has been handed on to another campaign.
         """
         if self._executor is None or not _is_same(self._executor.plan, plan):
-            raise RobotTaken(
+            raise RobotBusy(
                 f"the robot no longer serves the campaign in {plan.folder}; repeat the start command"
             )
         try:

@@ -87,7 +87,7 @@ class OverPool:
         Returns:
             Candidate, [D], a copy.
         """
-        return candidates.x[rng.choice(candidates.untried(history))].copy()
+        return candidates.x[rng.choice(candidates.untried_indices(history))].copy()
 
     def maximize(
         self,
@@ -107,7 +107,7 @@ class OverPool:
         Returns:
             Candidate, [D], a copy.
         """
-        untried = candidates.untried(history)
+        untried = candidates.untried_indices(history)
         cuts = range(BLOCK, len(untried), BLOCK)
         with torch.no_grad():
             best = torch.cat([value(candidates.phi[block]) for block in np.split(untried, cuts)]).argmax()

@@ -123,12 +123,12 @@ class Candidates:
         Returns:
             The pool; the unit is 1 where it is empty or all features are the same.
         """
-        raw = cls.unscaled(problem, embed)
+        raw = Candidates.embed_pool(problem, embed)
         unit = math.sqrt(2 * float(raw.phi.var(dim=0, correction=0).sum())) if len(raw.x) else 1.0
         return raw.in_units_of(unit or 1.0)
 
     @classmethod
-    def unscaled(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
+    def embed_pool(cls, problem: Problem, embed: Callable[[Tensor], Tensor]) -> "Candidates":
         """Give the pool features as they are.
 
         Args:
@@ -164,7 +164,7 @@ class Candidates:
         """Features of any controllers, in the same unit; gradients reach them."""
         return self.embed(x) / self.unit
 
-    def untried(self, history: History) -> Int[np.ndarray, " u"]:
+    def untried_indices(self, history: History) -> Int[np.ndarray, " u"]:
         """Indices of the candidates no trial was spent on.
 
         Raises:
@@ -188,7 +188,7 @@ def as_they_are(problem: Problem) -> Candidates:
 
 def in_the_cube(problem: Problem) -> Candidates:
     """The pool, compared by controller parameters in the unit cube, as packaged methods expect them."""
-    return Candidates.unscaled(problem, _identity)
+    return Candidates.embed_pool(problem, _identity)
 
 
 def by_latents(problem: Problem, embedding: Embedding) -> Candidates:
@@ -215,7 +215,7 @@ def by_density(problem: Problem, density: Density) -> Candidates:
     Returns:
         The pool, with the rows that the density's divergence compares as features.
     """
-    return Candidates.unscaled(problem, density.rows)
+    return Candidates.embed_pool(problem, density.rows)
 
 
 def _require(part: Part | None, name: str, made_by: str) -> Part:

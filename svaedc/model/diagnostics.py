@@ -94,7 +94,7 @@ def _measure(model: SvaeDc, batch: Batch) -> dict[str, Float[Tensor, "batch *res
     terms = model(*batch)
     q, p = model.posterior(batch.xi, batch.bad, batch.y), model.prior(batch.x)
     (q_tau, q_psi), (p_tau, p_psi) = model.split(q.loc), model.split(p.loc)
-    xi = model.normaliser.scaled(batch.xi)
+    xi = model.normaliser.normalize(batch.xi)
     log_p_xi_from_x, log_p_y_from_x = model.generation_terms(p, batch.xi, batch.y)
     return {
         "median_error": (model.normaliser.median - xi).abs().mean(-1),

@@ -110,7 +110,7 @@ class Normalizer(nn.Module):
         self.median.copy_(torch.from_numpy(statistics.median))
         self.spread.copy_(torch.from_numpy(statistics.spread).unsqueeze(1))
 
-    def scaled(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
+    def normalize(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
         """SI units to parts of the observation range."""
         return (xi - self.low) / (self.high - self.low)
 
@@ -118,10 +118,10 @@ class Normalizer(nn.Module):
         """SI units to deviations from the per-step median, in units of each dimension's spread."""
         return (self.scaled(xi) - self.median) / self.spread
 
-    def unscaled(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
+    def denormalize(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
         """Parts of the observation range to SI units."""
         return xi * (self.high - self.low) + self.low
 
 
-POSTERIOR_INPUTS: Final = {"scaled": Normalizer.scaled, "residual": Normalizer.residual}
+POSTERIOR_INPUTS: Final = {"scaled": Normalizer.normalize, "residual": Normalizer.residual}
 """q sees a trajectory in one of these forms; residuals cut the held-out reconstruction error by a fifth."""

@@ -60,7 +60,7 @@ def reconstructions(
 
 def _decode(model: SvaeDc, name: str, tau: torch.Tensor, psi: torch.Tensor) -> Reconstruction:
     y = float(model.badness_at(psi)) if model.config.has_psi else float("nan")
-    return Reconstruction(name, model.normaliser.unscaled(model.p_xi(tau).loc)[0].numpy(), y)
+    return Reconstruction(name, model.normaliser.denormalize(model.p_xi(tau).loc)[0].numpy(), y)
 
 
 def remarkable(f: Float[np.ndarray, " episodes"], rng: np.random.Generator) -> dict[str, int]:

@@ -74,7 +74,7 @@ class SvaeDc(nn.Module):
         q = self.posterior(xi, bad, y)
         tau, psi = self.split(q.rsample())
         return ElboTerms(
-            log_p_xi=self.p_xi(tau).log_prob(self.normaliser.scaled(xi)),
+            log_p_xi=self.p_xi(tau).log_prob(self.normaliser.normalize(xi)),
             log_p_y=self.p_y(psi).log_prob(y) if self.config.has_psi else torch.zeros_like(y),
             kl=kl_divergence(q, self.prior(x)),
         )
@@ -118,7 +118,7 @@ class SvaeDc(nn.Module):
         """
         tau, psi = self.split(p.loc)
         log_p_y = self.p_y(psi).log_prob(y) if self.config.has_psi else torch.zeros_like(y)
-        return self.p_xi(tau).log_prob(self.normaliser.scaled(xi)), log_p_y
+        return self.p_xi(tau).log_prob(self.normaliser.normalize(xi)), log_p_y
 
     def posterior(
         self,
@@ -177,7 +177,7 @@ class SvaeDc(nn.Module):
     def generate(self, x: Float[Tensor, "batch controller"]) -> Float[Tensor, "batch obs time"]:
         """Trajectory of each controller, decoded from the mean of p(tau|x), in SI units."""
         tau, _ = self.split(self.prior(x).loc)
-        return self.normaliser.unscaled(self.p_xi(tau).loc)
+        return self.normaliser.denormalize(self.p_xi(tau).loc)
 
     def reconstruct(
         self,
@@ -196,7 +196,7 @@ class SvaeDc(nn.Module):
             Trajectories in SI units, [batch, obs, time].
         """
         tau, _ = self.split(self.posterior(xi, bad, y).loc)
-        return self.normaliser.unscaled(self.p_xi(tau).loc)
+        return self.normaliser.denormalize(self.p_xi(tau).loc)
 
 
 def initialized_model(

@@ -142,18 +142,18 @@ class JointStage(Stage):
             The loss, and the unweighted terms behind it.
         """
         terms = wrapped(self._training.gather(positions, next(wrapped.parameters()).device))
-        return self._weighted(terms, self._weighting.kl_at(self.progress)), terms
+        return self._loss_of(terms, self._weighting.kl_at(self.progress)), terms
 
     def held_out_loss(self, metrics: dict[str, float]) -> float:
         """The same at the weights of the stage's end."""
-        return self._weighted(metrics, self._weighting.kl)
+        return self._loss_of(metrics, self._weighting.kl)
 
     @property
     def keeps_best(self) -> bool:
         """Only with early stopping: a decaying learning rate makes the last epoch the best one."""
         return math.isfinite(self.settings.patience)
 
-    def _weighted(self, terms: Mapping[str, Any], kl_weight: float) -> Any:
+    def _loss_of(self, terms: Mapping[str, Any], kl_weight: float) -> Any:
         weights = self._weighting
         bound = terms["log_p_xi"] + weights.y * terms["log_p_y"] - kl_weight * terms["kl"]
         return -(bound + weights.from_x(terms)) / self._elements
@@ -223,11 +223,11 @@ class PriorStage(Stage):
         batch = self._training.gather(ordered, q.loc.device)
         rows = torch.from_numpy(ordered).to(q.loc.device)
         terms = wrapped(batch, type(q)(q.loc[rows], q.scale[rows]))
-        return self._weighted(terms), terms
+        return self._loss_of(terms), terms
 
     def held_out_loss(self, metrics: dict[str, float]) -> float:
         """The same on held-out episodes."""
-        return self._weighted(metrics)
+        return self._loss_of(metrics)
 
     @property
     def keeps_best(self) -> bool:
@@ -240,7 +240,7 @@ class PriorStage(Stage):
         for value in self._frozen:
             value.requires_grad = True
 
-    def _weighted(self, terms: Mapping[str, Any]) -> Any:
+    def _loss_of(self, terms: Mapping[str, Any]) -> Any:
         weights = self._weighting
         # Alone, the KL needs no weight, not even when it had none in stage one.
         return weights.kl * terms["kl"] - weights.from_x(terms) if weights.generation else terms["kl"]

@@ -1,6 +1,6 @@
 """What svaedc 0.1.0 wrote is read as before: datasets, models, states of training, comparisons, campaigns.
 
-The files under `v0_1_0/` were written by commit 109d1f0, the last one before the rooms; each `.txt` and `.json`
+The files under `v0_1_0/` were written by commit 109d1f0, the last before the rooms. Each `.txt` and `.json`
 beside them holds what that version said of them.
 """
 

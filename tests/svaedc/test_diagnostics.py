@@ -47,7 +47,7 @@ def test_relative_errors_are_those_of_plain_loops(model, halves):
     with torch.no_grad():
         generated = model.eval().generate(torch.from_numpy(held_out.x[held_out.rows])).numpy()
     truth = held_out.xi[held_out.rows]
-    median = model.normaliser.unscaled(model.normaliser.median[None])[0].numpy()
+    median = model.normaliser.denormalize(model.normaliser.median[None])[0].numpy()
     ratios = [
         np.abs(generated[:, d] - truth[:, d]).mean() / np.abs(median[d] - truth[:, d]).mean()
         for d in range(5)
@@ -111,9 +111,9 @@ def test_evaluation_repeats_and_leaves_mode_and_generator_alone(model, halves):
 def test_a_dimension_that_never_moves_is_left_out_of_the_errors(model, halves):
     held_out = halves[1]
     xi = held_out.xi.copy()
-    xi[:, 2] = model.normaliser.unscaled(model.normaliser.median[None])[0, 2].numpy()
+    xi[:, 2] = model.normaliser.denormalize(model.normaliser.median[None])[0, 2].numpy()
     with torch.no_grad():
-        model.normaliser.median[2] = model.normaliser.scaled(torch.from_numpy(xi[:1]))[0, 2]
+        model.normaliser.median[2] = model.normaliser.normalize(torch.from_numpy(xi[:1]))[0, 2]
     assert np.isfinite(evaluate(model, replace(held_out, xi=xi))["gen_norm"])
 
 

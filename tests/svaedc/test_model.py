@@ -31,7 +31,7 @@ def test_the_bound_is_the_mean_of_its_sampled_four_term_form(variant, batch):
     torch.manual_seed(0)
     with torch.no_grad():
         q, p = variant.posterior(batch.xi, batch.bad, batch.y), variant.prior(batch.x)
-        xi = variant.normaliser.scaled(batch.xi)
+        xi = variant.normaliser.normalize(batch.xi)
         sampled, closed = [], []
         for _ in range(400):
             code = q.rsample()
@@ -49,7 +49,7 @@ def test_generation_terms_are_those_of_the_prior_s_means(variant, batch):
         log_p_xi, log_p_y = variant.generation_terms(variant.prior(batch.x), batch.xi, batch.y)
         generated = variant.generate(batch.x)
         tau, psi = variant.split(variant.prior(batch.x).loc)
-        scaled = variant.normaliser.scaled(generated)
+        scaled = variant.normaliser.normalize(generated)
         peak = variant.p_xi(tau).log_prob(scaled)
     assert log_p_xi.shape == log_p_y.shape == (16,)
     assert (log_p_xi < peak).all()
@@ -147,7 +147,7 @@ def test_the_bound_and_its_gap_to_the_evidence_are_those_of_numerical_integratio
     with torch.no_grad():
         q, p = tiny.posterior(*one[1:]), tiny.prior(one[0])
         log_q, log_p = (over(each, grid) for each in (q, p))
-        xi = tiny.normaliser.scaled(one[1]).expand(len(axis), -1, -1)
+        xi = tiny.normaliser.normalize(one[1]).expand(len(axis), -1, -1)
         log_p_xi = tiny.p_xi(axis[:, None]).log_prob(xi).repeat_interleave(len(axis))
         log_p_y = tiny.p_y(axis[:, None]).log_prob(one[3].expand(len(axis))).repeat(len(axis))
         joint = log_p_xi + log_p_y + log_p
@@ -183,7 +183,7 @@ def test_the_svae_s_bound_is_the_three_term_one_and_knows_nothing_of_badness(sva
     torch.manual_seed(0)
     with torch.no_grad():
         q, p = svae.posterior(batch.xi, batch.bad, batch.y), svae.prior(batch.x)
-        xi = svae.normaliser.scaled(batch.xi)
+        xi = svae.normaliser.normalize(batch.xi)
         codes = [q.rsample() for _ in range(150)]
         sampled = torch.stack(
             [svae.p_xi(code).log_prob(xi) + p.log_prob(code) - q.log_prob(code) for code in codes]

@@ -76,6 +76,6 @@ def test_scaling_puts_the_bounds_at_zero_and_one_and_back():
     normaliser = Normalizer(3, 30)
     normaliser.adopt(measured(trajectories()))
     xi = torch.stack([torch.full((3, 30), -4.0), torch.full((3, 30), 4.0)])
-    scaled = normaliser.scaled(xi)
+    scaled = normaliser.normalize(xi)
     torch.testing.assert_close(scaled, torch.stack([torch.zeros(3, 30), torch.ones(3, 30)]))
-    torch.testing.assert_close(normaliser.unscaled(scaled), xi)
+    torch.testing.assert_close(normaliser.denormalize(scaled), xi)

@@ -15,7 +15,7 @@ from cluster.hardware.identity import Approval, IdentityMismatch
 from cluster.hardware.lock import FolderTaken
 from cluster.hardware.plan import CampaignPlan, identify
 from cluster.hardware.proposals import Proposals, fingerprint, library_versions
-from cluster.hardware.station import RobotTaken, Station
+from cluster.hardware.station import RobotBusy, Station
 from cluster.hardware.status import Phase
 from svaedc.bo import methods
 from svaedc.model import checkpoint
@@ -189,9 +189,9 @@ def test_a_station_goes_on_with_the_campaign_it_has(tmp_path):
 def test_a_station_refuses_another_campaign_while_the_drivers_of_the_first_ask(tmp_path):
     post = Station()
     post.enter(plan_in(tmp_path / "first"))
-    with pytest.raises(RobotTaken, match=r"is held by the campaign in .*first"):
+    with pytest.raises(RobotBusy, match=r"is held by the campaign in .*first"):
         post.enter(plan_in(tmp_path / "second"))
-    with pytest.raises(RobotTaken, match=r"no longer serves the campaign in .*second"):
+    with pytest.raises(RobotBusy, match=r"no longer serves the campaign in .*second"):
         post.advance(plan_in(tmp_path / "second"))
     post.leave()
 
@@ -203,7 +203,7 @@ def test_a_station_whose_driver_is_gone_is_handed_on_between_trials(tmp_path, mo
     post.enter(first)
     post.enter(second)
     assert post.advance(second).measured == 1
-    with pytest.raises(RobotTaken, match="no longer serves"):
+    with pytest.raises(RobotBusy, match="no longer serves"):
         post.advance(first)
     post.leave()
     assert operator.status(tmp_path / "first").measured == 0

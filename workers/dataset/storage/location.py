@@ -37,7 +37,7 @@ def _name(path: Location) -> str:
 
 def fetch(path: Location) -> Location:
     """The same path, to be read several times: an object's bytes are asked for once."""
-    return path if isinstance(path, Path) else path.fetched()
+    return path if isinstance(path, Path) else path.fetch()
 
 
 def source(path: Location) -> Any:

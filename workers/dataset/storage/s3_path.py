@@ -130,7 +130,7 @@ class ObjectPath:
         with reaching(self):
             return self._store.open_input_file(self._place)
 
-    def fetched(self) -> "ObjectPath":
+    def fetch(self) -> "ObjectPath":
         """The same path with its bytes, which are asked for once."""
         return self if self.content is not None else replace(self, content=self.read_bytes())
 
