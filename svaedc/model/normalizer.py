@@ -116,7 +116,7 @@ class Normalizer(nn.Module):
 
     def residual(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
         """SI units to deviations from the per-step median, in units of each dimension's spread."""
-        return (self.scaled(xi) - self.median) / self.spread
+        return (self.normalize(xi) - self.median) / self.spread
 
     def denormalize(self, xi: Float[Tensor, "batch obs time"]) -> Float[Tensor, "batch obs time"]:
         """Parts of the observation range to SI units."""
