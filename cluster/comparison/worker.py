@@ -25,7 +25,7 @@ from workers.rollout import rollout
 from workers.setups import Setup
 
 STEP_SECONDS = 1.0
-"""After which a worker reports: what a user sees as live, and some trials of any robot."""
+"""A worker reports after so long: a user sees that as live, and any robot makes some trials in it."""
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}
 
 
@@ -114,7 +114,17 @@ class ComparisonJob:
 
 
 def evaluation(setup: Setup, environment: Environment, gap: str, run: int) -> Callable[[np.ndarray], Outcome]:
-    """What one run maximises: the setup under hidden physics, drawn once from the gap's ranges."""
+    """Make what one run maximises: the setup under hidden physics, drawn once from the gap's ranges.
+
+    Args:
+        setup: whose controllers are tried.
+        environment: in which.
+        gap: level of the hidden physics, or its ranges written out.
+        run: seed of the run, which decides the physics.
+
+    Returns:
+        A function that rolls a controller out, [D] in the unit cube, and says what that showed.
+    """
     physics = setup.gap(gap).draw(generator(run, Stream.HIDDEN_PHYSICS, 0))
 
     def evaluate(x: np.ndarray) -> Outcome:
