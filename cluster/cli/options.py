@@ -51,7 +51,15 @@ TrainedModel = Annotated[
 
 
 def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":
-    """The settings of a command."""
+    """Read the settings of a command.
+
+    Args:
+        config: the file given with `--config`; None for the usual one, if it exists.
+        overrides: the texts of `--set`; None for none.
+
+    Returns:
+        All sections.
+    """
     from cluster.settings import load_settings
 
     return load_settings(config, overrides or [])
@@ -61,7 +69,16 @@ def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":
 def services(
     settings: "Settings", address: str | None, parts: "tuple[Part, ...]" = ("dashboard",)
 ) -> Iterator[tuple["Session", "Tracker"]]:
-    """The tracker, whose store must exist before anything else starts, and the Ray session."""
+    """Open the tracker, whose store must exist before anything else starts, and the Ray session.
+
+    Args:
+        settings: of the command.
+        address: of a running cluster; None for that of RAY_ADDRESS, or a new one.
+        parts: of a new cluster.
+
+    Yields:
+        The session and the tracker.
+    """
     from cluster.runtime.session import connect
     from cluster.runtime.signals import interruptible
     from cluster.tracking import open_tracker
