@@ -18,8 +18,9 @@ from workers.randomness import Stream, generator
 from workers.setups import Setup
 
 DRAWS: Final = 2
-"""The version of how controllers are drawn: 1 drew in float64 and rounded, as campaigns of svaedc 0.1.0 did; 2
-draws in float32, as comparisons always did. The two are different controllers of the same seed."""
+"""This is the version of how controllers are drawn: 1 drew in float64 and rounded, as campaigns of svaedc
+0.1.0 did; 2 draws in float32, as comparisons always did. The two are different controllers of the same
+seed."""
 
 
 @dataclass(frozen=True)
