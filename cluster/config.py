@@ -20,11 +20,11 @@ from pydantic import (
 )
 
 UserPath = Annotated[Path, AfterValidator(Path.expanduser)]
-"""A path in which a leading `~` stands for the user's home."""
+"""A leading `~` of such a path stands for the user's home."""
 
 
 Part = Literal["dashboard"]
-"""What a cluster started by a command may do without: the dashboard, which Ray Train queries all the time."""
+"""A cluster started by a command may do without this: the dashboard, which Ray Train queries all the time."""
 
 
 class Section(BaseModel):
@@ -37,32 +37,33 @@ class RaySettings(Section):
     """A Ray cluster started by the command itself; unused when it joins a running one."""
 
     num_cpus: PositiveInt | Literal["all"] = "all"
-    """CPUs the cluster offers; `all` is every CPU this process may use."""
+    """The cluster offers so many CPUs; `all` is every CPU this process may use."""
     object_store_memory: int = Field(default=300_000_000, ge=80_000_000)
-    """Bytes of shared memory for objects; results here are small, so little is needed."""
+    """Objects share so many bytes of memory; results here are small, so little is needed."""
     temporary_folder: UserPath = Path("/tmp/ray")
-    """Sockets and logs; short, because a socket's whole path may have 107 characters."""
+    """Sockets and logs lie here; it is short, because a socket's whole path may have 107 characters."""
     log_file_bytes: int = Field(default=20_000_000, ge=100_000)
-    """Bytes after which a process of Ray begins its log anew; the full one before it is kept."""
+    """A process of Ray begins its log anew after so many bytes; the full one before it is kept."""
     connect_timeout_seconds: float = Field(default=5.0, gt=0.0, le=3600.0)
-    """How long a running cluster has to accept a connection; at most an hour."""
+    """A running cluster has so long to accept a connection, at most an hour."""
 
 
 class CollectSettings(Section):
     """`svaedc collect`: how rollouts are spread over actors."""
 
     actors: PositiveInt | Literal["all"] = "all"
-    """Rollout processes, one CPU each; `all` is one per CPU of the cluster."""
+    """So many processes roll out, one CPU each; `all` is one per CPU of the cluster."""
     episodes_per_shard: PositiveInt = 256
-    """Rows of one Parquet file; part of a dataset's identity."""
+    """One Parquet file has so many rows; this is part of a dataset's identity."""
     storage: Literal["float32", "int16"] = "float32"
-    """Of trajectories: exact, or codes between their channels' bounds; part of a dataset's identity."""
+    """Trajectories are stored exactly or as codes between their channels' bounds; this is part of a dataset's
+    identity."""
     shards_in_flight_per_actor: PositiveInt = 1
-    """Shards handed to an actor ahead of its finishing the first."""
+    """An actor has so many shards at a time, the one that it rolls out included."""
     attempts_per_shard: PositiveInt = 3
-    """Failures after which a shard is put aside with its error."""
+    """A shard is put aside with its error after so many failures."""
     shard_timeout_seconds: PositiveFloat = 1800.0
-    """Time after which a shard counts as failed and its actor is replaced."""
+    """A shard counts as failed after this time, and its actor is replaced."""
 
     def actor_count(self, cpus: int) -> int:
         """Rollout actors on a cluster with this many CPUs, at least one."""
@@ -73,54 +74,58 @@ CHANGEABLE = (
     *("model", "latent", "distribution", "head"),
     *("weighting", "kl_weight", "learning_rate", "epoch_updates", "patience"),
 )
-"""Settings of training that belong to the preset unless they are given."""
+"""These settings of training belong to the preset unless they are given."""
 
 
 class TrainSettings(Section):
     """`svaedc train`: where and for how long; what is trained is the preset's business."""
 
     workers: PositiveInt = 1
-    """Data-parallel training processes."""
+    """So many training processes share the data of every update."""
     least_workers: PositiveInt | Literal["all"] = "all"
     """With fewer than `workers`, training starts and goes on with as many as there is room for."""
     threads: PositiveInt | Literal["all"] = "all"
-    """Of each process, one CPU each; `all` shares the free CPUs among the processes, each on one machine."""
+    """Each process has so many threads, one CPU each; `all` shares the free CPUs among the processes, each on
+    one machine."""
     updates: PositiveInt | Literal["preset"] = "preset"
-    """Gradient updates of each stage; fewer train faster and worse."""
+    """Each stage makes so many gradient updates; fewer train faster and worse."""
     stride: PositiveInt | Literal["preset"] = "preset"
-    """Every how many control steps the model sees one; 5 in the preset `compact`, 1 in `paper`."""
+    """The model sees one of so many control steps: 5 in the preset `compact`, 1 in `paper`."""
     time_limit_seconds: PositiveFloat = inf
     """Training stops after the epoch in which this passes."""
     cache_folder: UserPath = Path("~/.cache/svaedc").expanduser()
-    """Where shards are decoded into one memory-mapped array, once per dataset."""
+    """Shards are decoded here into one memory-mapped array, once per dataset."""
     checkpoint_every_epochs: PositiveInt = 1
-    """Epochs that an interruption may cost."""
+    """An interruption may cost so many epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """`auto` takes a GPU for each process where the cluster has any; `cuda` refuses to do without."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
-    """Of matrix products; `auto` is bfloat16 on a GPU that has it, and float32 elsewhere."""
+    """Matrix products have this precision; `auto` is bfloat16 on a GPU that has it, and float32 elsewhere."""
     moments: NonNegativeInt = 10
-    """Pictures of each trajectory in the clip of the trained model's motions; 0 for no clip and no stills."""
+    """The clip of the trained model's motions has so many pictures of each trajectory; 0 leaves clip and
+    stills out."""
     balance: Literal["none", "y", "f"] = "none"
-    """Show episodes of every tenth of the range of y or f equally often; for skewed data."""
+    """Episodes of every tenth of the range of y or f are shown equally often, for skewed data."""
     model: Literal["preset", "svae-dc", "svae"] = "preset"
     """`svae` knows nothing of badness."""
     latent: Literal["preset", "3x3", "5x6", "15x12"] = "preset"
-    """Steps of the latent path x dimensions of each, with the hidden sizes the paper gives them."""
+    """The latent path has so many steps x dimensions of each, with the hidden sizes the paper gives them."""
     distribution: Literal["preset", "laplace", "gaussian"] = "preset"
-    """Family of all four distributions."""
+    """All four distributions are of this family."""
     head: Literal["preset", "low-rank", "dense"] = "preset"
-    """Output of p(xi|tau)."""
+    """p(xi|tau) has this kind of output."""
     weighting: Literal["preset", "paper", "hybrid", "balanced"] = "preset"
-    """Weights of the bound's terms: the paper's; with generation from x; and with more weight on y too."""
+    """The bound's terms have the paper's weights; `hybrid` adds generation from x, `balanced` more weight on
+    y too."""
     kl_weight: NonNegativeFloat | Literal["preset"] = "preset"
-    """Of the KL term; 1 is the paper's equation."""
+    """The KL term has this weight; 1 is the paper's equation."""
     learning_rate: PositiveFloat | Literal["preset"] = "preset"
-    """Of the first update of the joint stage."""
+    """The first update of the joint stage has this learning rate."""
     epoch_updates: PositiveInt | Literal["preset"] = "preset"
-    """Updates between two measures on held-out episodes, an epoch here whatever the dataset's size."""
+    """Two measures on held-out episodes are so many updates apart, an epoch here whatever the dataset's
+    size."""
     patience: PositiveInt | Literal["preset"] = "preset"
-    """Epochs without a better held-out loss after which a stage ends early."""
+    """A stage ends early after so many epochs without a better held-out loss."""
 
     def stride_or(self, usual: int) -> int:
         """The stride, which is the preset's usual one unless it is given."""
@@ -135,29 +140,29 @@ class CompareSettings(Section):
     """`svaedc compare`: the simulated BO runs."""
 
     slots: PositiveInt = 2
-    """Runs at the same time, one CPU each."""
+    """So many runs go on at the same time, one CPU each."""
     pool_size: PositiveInt = 5000
-    """Candidate controllers drawn afresh for every run."""
+    """So many candidate controllers are drawn afresh for every run."""
     initial_trials: PositiveInt = 2
-    """Random trials before the first suggestion; all methods of a seed share them."""
+    """So many random trials come before the first suggestion; all methods of a seed share them."""
 
 
 class HardwareSettings(Section):
     """`svaedc hardware`: campaigns on the one robot."""
 
     pool_size: PositiveInt = 5000
-    """Candidate controllers drawn for a campaign; part of its identity."""
+    """So many candidate controllers are drawn for a campaign; this is part of its identity."""
     namespace: str = Field(default="svaedc", min_length=1)
-    """Ray namespace of the one hardware actor; the same for everybody who shares the robot."""
+    """The one hardware actor is in this Ray namespace, the same for everybody who shares the robot."""
 
 
 class TrackingSettings(Section):
     """Where MLflow keeps the runs."""
 
     uri: str = Field(default="sqlite:///mlflow.db", min_length=1)
-    """`sqlite:///FILE` (relative to the working directory) or the address of an MLflow server."""
+    """This is `sqlite:///FILE` (relative to the working directory) or the address of an MLflow server."""
     experiment: str = Field(default="svaedc", min_length=1)
-    """The MLflow experiment that holds the runs."""
+    """This MLflow experiment holds the runs."""
 
 
 class Settings(Section):

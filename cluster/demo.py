@@ -20,7 +20,7 @@ SETUP = "franka"
 OURS = "svae-dc"
 BASELINES = ("random", "screened-random")
 STEPS = {"collect": "1/3 collect", "train": "2/3 train", "compare": "3/3 compare"}
-"""What a person reads of the steps of the demo."""
+"""A person reads these names of the steps of the demo."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,17 @@ def demo(
     folder: Path, settings: Settings, session: Session, tracker: Tracker, size: DemoSize = FULL
 ) -> Comparison:
     """Collect, train and compare on the Franka push; rerun it to go on where it was interrupted.
+
+    Args:
+        folder: of everything.
+        settings: of all stages; training is short and its cache lies in the folder unless they ask for
+            others.
+        session: where they run.
+        tracker: that records them.
+        size: how much of everything.
+
+    Returns:
+        The comparison at the end, with its MLflow run.
 
     Raises:
         UserError: a stage cannot run; the cluster is checked for all of them before the first.
@@ -106,12 +117,15 @@ def _demo_settings(folder: Path, settings: Settings, size: DemoSize) -> Settings
 
 
 def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:
-    """What the numbers show, and where everything is.
+    """Put into words what the numbers show, and where everything is.
 
     Args:
         folder: of the demo.
         comparison: its last stage.
         viewer: the command that serves the comparison's MLflow run.
+
+    Returns:
+        Text of several lines.
     """
     found = [
         verdict(difference)

@@ -39,6 +39,9 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
         folder: that is locked; what is below it is not.
         refusal: what another command is told meanwhile, with the remedy.
 
+    Yields:
+        Nothing.
+
     Raises:
         UserError: another command works in the folder.
     """

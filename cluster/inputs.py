@@ -74,9 +74,19 @@ def durable_dataset(text: str) -> "Location":
 
 
 def setup_of(name: str, bad: str = "") -> "Setup":
-    """The setup of that name, with G_bad of that name unless it is ""; an unknown one is a usage error.
+    """Load the setup of that name.
 
     Users' modules are found in the working directory too, after everything that is installed.
+
+    Args:
+        name: of a setup that ships, or of an importable module.
+        bad: G_bad as `module:function`; "" for the setup's own.
+
+    Returns:
+        The setup, with that G_bad.
+
+    Raises:
+        UsageError: there is no such setup or G_bad, or a module is not as it must be.
     """
     from workers.setups.registry import load
 
@@ -91,7 +101,14 @@ def setup_of(name: str, bad: str = "") -> "Setup":
 
 
 def require_working_setup(setup: "Setup", seed: int) -> "Setup":
-    """The setup, tried out if users supplied a part of it: before anything starts or claims a folder.
+    """Try a setup out if users supplied a part of it, before anything starts or claims a folder.
+
+    Args:
+        setup: what is tried.
+        seed: of the dataset; its episode 0 is the one rolled out.
+
+    Returns:
+        The same setup.
 
     Raises:
         UserError: it does not work.

@@ -48,7 +48,12 @@ class ProgressLine:
         return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
 
     def advance(self, count: int, note: str) -> None:
-        """Count items as done; the note is shown behind the rate."""
+        """Count items as done.
+
+        Args:
+            count: how many.
+            note: shown behind the rate.
+        """
         self.done += count
         if self._bar and self._task is not None:
             self._bar.update(self._task, advance=count, note=f"{self.rate:.1f}/s  {note}")

@@ -11,7 +11,7 @@ from cluster.config import Settings
 from cluster.errors import UsageError, nearest
 
 DEFAULT_FILE = Path("ray_config.yaml")
-"""Read from the working directory when no `--config` is given and it exists."""
+"""It is read from the working directory when no `--config` is given and it exists."""
 
 
 def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
@@ -22,6 +22,9 @@ def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
             directory is read if it is there.
         overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the
             value is a YAML scalar.
+
+    Returns:
+        All sections, with the defaults of what is not given.
 
     Raises:
         UsageError: the file is absent or unreadable, a key is unknown, or a value is out of its range.

@@ -51,7 +51,15 @@ TrainedModel = Annotated[
 
 
 def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":
-    """The settings of a command."""
+    """Read the settings of a command.
+
+    Args:
+        config: the file given with `--config`; None for the usual one, if it exists.
+        overrides: the texts of `--set`; None for none.
+
+    Returns:
+        All sections.
+    """
     from cluster.settings import load_settings
 
     return load_settings(config, overrides or [])

@@ -37,6 +37,9 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
         session: where it runs.
         tracker: that records it.
 
+    Returns:
+        Summary of all runs in the folder, and the address of the MLflow run.
+
     Raises:
         UserError: the folder holds another comparison or cannot be written, runs kept failing, or MLflow
             lacks some of the results.

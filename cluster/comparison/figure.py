@@ -37,10 +37,10 @@ STYLES = {
     "turbo": ("#661100", (6, 1, 0), "--"),
     "saasbo": ("#332288", (3, 1, 0), "--"),
 }
-"""Colour (Okabe and Ito's, which colour-blind people can tell apart), marker and line of each method: dotted
-without a model of f or by `optimize_acqf`, dashed on controllers, solid on latent paths; a variant shares its
-colour. Markers are drawn without edges, so all are filled ones; a tuple is a star of that many points, turned
-by degrees."""
+"""Each method has a colour (Okabe and Ito's, which colour-blind people can tell apart), a marker and a line.
+A line is dotted without a model of f or by `optimize_acqf`, dashed on controllers, solid on latent paths; a
+variant shares its colour. Markers are drawn without edges, so all are filled ones; a tuple is a star of that
+many points, turned by degrees."""
 _MARKERS = 24  # at most, on a curve: more would hide its line
 _OTHER_STYLE = ("#000000", "d", "-.")
 
@@ -48,7 +48,7 @@ _OTHER_STYLE = ("#000000", "d", "-.")
 def best_so_far(
     path: Path, summary: Summary, *, title: str, initial: int, limits: tuple[float, float]
 ) -> tuple[Path, Path]:
-    """Mean best objective so far of every method with its interval, as PNG and SVG of reproducible bytes.
+    """Draw the mean best objective so far of every method with its interval, in reproducible bytes.
 
     Args:
         path: of the figure; its suffix is replaced.
@@ -56,6 +56,9 @@ def best_so_far(
         title: above it.
         initial: shared random trials, which are shaded.
         limits: of the objective; intervals of few runs reach beyond them and are cut there.
+
+    Returns:
+        Paths of the PNG and of the SVG.
     """
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     curves, final = figure.subplots(1, 2, sharey=True, width_ratios=(4, 1.3))

@@ -24,7 +24,7 @@ _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 def page(
     title: str, summary: Summary, figures: Sequence[Path], initial: int, settings: Mapping[str, Any]
 ) -> str:
-    """The whole page; it loads nothing from elsewhere and runs no script.
+    """Compose the whole page; it loads nothing from elsewhere and runs no script.
 
     Args:
         title: what was compared.
@@ -32,6 +32,9 @@ def page(
         figures: files to embed.
         initial: shared random trials.
         settings: what the comparison was made with, fingerprints included.
+
+    Returns:
+        The page as HTML.
     """
     after = checkpoints(summary, initial)
     parts = [
@@ -54,7 +57,16 @@ def page(
 
 
 def checkpoints(summary: Summary, initial: int) -> list[int]:
-    """Trials that the tables show, counted from 0: the 10th and 20th suggested ones, and the last."""
+    """Choose the trials that the tables show.
+
+    Args:
+        summary: of the comparison.
+        initial: shared random trials.
+
+    Returns:
+        Their indices, counted from 0, in order: of the 10th and 20th suggested trials, where runs have so
+        many, and of the last trial.
+    """
     wanted = {initial + 9, initial + 19, summary.trials - 1}
     return sorted(index for index in wanted if index < summary.trials)
 

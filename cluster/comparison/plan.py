@@ -72,6 +72,10 @@ class Grid:
     def require_purpose(self, folder: ComparisonFolder, seeds: Iterable[int]) -> None:
         """Refuse to mix runs for tuning and runs for reporting in one folder.
 
+        Args:
+            folder: of the comparison, for the message.
+            seeds: of the runs that the folder holds.
+
         Raises:
             UserError: the folder's seeds are for something else.
         """
@@ -185,17 +189,20 @@ def plan_comparison(
     settings: CompareSettings,
     caption: str = "",
 ) -> ComparisonPlan:
-    """A comparison that can be run.
+    """Check what is to be compared, before anything is written.
 
     Args:
         setup: whose controllers are tried.
         grid: methods and seeds.
         trials: suggested in each run.
         gap: level of the hidden physics, or its ranges written out.
-        model: folder of one trained on the setup, or on the one it stands in for.
+        model: folder of one trained on the setup, or on the one it stands in for; None without one.
         folder: of the results.
         settings: of the runs.
         caption: of figure and page, before what they say themselves.
+
+    Returns:
+        A comparison that can be run.
 
     Raises:
         UsageError: a gap level does not exist, a gap's range is impossible, or a method lacks its model.
@@ -231,7 +238,14 @@ def plan_comparison(
 
 
 def usable(model: Path, setup: Setup) -> tuple[Path, str]:
-    """The checkpoint and the setup it was trained on: this one, or the one that it stands in for.
+    """Read a model and refuse one that was trained on another setup.
+
+    Args:
+        model: folder that `svaedc train` left, or the checkpoint in it.
+        setup: that is compared on.
+
+    Returns:
+        Path of the checkpoint, and the setup it was trained on: this one, or the one that it stands in for.
 
     Raises:
         UserError: it cannot be read, or was trained on another one.

@@ -39,11 +39,16 @@ class RunKey:
 
 
 Runs = Mapping[RunKey, list[Trial]]
-"""All trials of all runs, in order."""
+"""It holds all trials of all runs, in order."""
 
 
 def append(path: Path, trial: Trial) -> None:
-    """Add a trial to a run's record; it is on disk when this returns."""
+    """Add a trial to a run's record; it is on disk when this returns.
+
+    Args:
+        path: of the record, which the first trial creates.
+        trial: the next one of the run.
+    """
     with path.open("ab+") as file:
         # A worker whose driver died may still be at it.
         fcntl.flock(file, fcntl.LOCK_EX)

@@ -32,7 +32,16 @@ class Report:
 
 
 def summary_of(job: ComparisonJob, setup: Setup, runs: Runs) -> Summary:
-    """Means, intervals and paired differences over all runs of the folder."""
+    """Summarise all runs of the folder; the same runs give the same numbers.
+
+    Args:
+        job: what all runs share.
+        setup: whose objective was maximised; it says which trials count as broken.
+        runs: all trials.
+
+    Returns:
+        Means, intervals and paired differences.
+    """
     reporting = Reporting(initial=job.initial, broken_below=setup.broken)
     return summarize(rows(runs), reporting, generator(0, Stream.BOOTSTRAP, 0))
 
@@ -54,6 +63,9 @@ def publish(
         summary: of them.
         settings: that the comparison was made with, for the page.
         caption: before the title of figure and page; "" for none.
+
+    Returns:
+        The files that were written.
 
     Raises:
         UserError: the disk is full.

@@ -16,7 +16,7 @@ from svaedc.bo.loop import Trial
 
 NOTE = "mlflow.json"
 CONSEQUENCE = ". The comparison goes on; what MLflow lacks is recorded at its end"
-"""What a person reads when the store fails meanwhile."""
+"""A person reads this behind the store's error when the store fails meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,16 @@ class Note:
 
 
 def note_in(folder: ComparisonFolder, tracker: Tracker) -> Note:
-    """The note of a folder, if it speaks of this store.
+    """Read the note of a folder.
 
     One that is damaged, or speaks of another store, counts for nothing: MLflow then gets everything again.
+
+    Args:
+        folder: of the comparison.
+        tracker: of the store that the note must speak of.
+
+    Returns:
+        The note; an empty one where none counts.
     """
     with suppress(FileNotFoundError, ValueError, TypeError, KeyError):
         content = json.loads((folder.path / NOTE).read_text(encoding="utf-8"))
@@ -52,7 +59,17 @@ def note_in(folder: ComparisonFolder, tracker: Tracker) -> Note:
 def begin(
     folder: ComparisonFolder, tracker: Tracker, name: str, parameters: Mapping[str, Any]
 ) -> "TrackedComparison":
-    """The run that an interrupted command of the same parameters began, or a new one."""
+    """Go on with the run that an interrupted command of the same parameters began, or start one.
+
+    Args:
+        folder: of the comparison.
+        tracker: that records it.
+        name: of a new run.
+        parameters: identity of the comparison and what the command asks for, by name.
+
+    Returns:
+        The parent run, which the note of the folder now names.
+    """
     note = note_in(folder, tracker)
     if note.run and note.parameters == parameters and not note.trials:
         return TrackedComparison(folder, note, tracker.resume(note.run))
@@ -82,6 +99,10 @@ class TrackedComparison:
     def child(self, key: RunKey, trials: list[Trial]) -> None:
         """Record a run, unless MLflow has it.
 
+        Args:
+            key: of the run.
+            trials: all of its trials.
+
         Raises:
             UserError: the store cannot be written.
         """
@@ -95,6 +116,11 @@ class TrackedComparison:
 
     def complete(self, report: Report, curves: Mapping[str, list[float]], trials: int) -> None:
         """Record the results of the whole comparison.
+
+        Args:
+            report: the files and figures to keep.
+            curves: one value per trial of each, by name.
+            trials: number of trials in the table.
 
         Raises:
             UserError: the store cannot be written.

@@ -63,18 +63,40 @@ class Watch(Callback):
         result: dict[str, Any],
         **_: Any,
     ) -> None:
-        """A run has made trials."""
+        """A run has made trials.
+
+        Args:
+            iteration: not used.
+            trials: not used.
+            trial: run, as Tune knows it.
+            result: what `RunTrainable.step` returned.
+            **_: not used.
+        """
         self.disk = self.disk or result.get("disk", "")
         if "trials" in result:
             self.standing.best[RunKey(**trial.config["run"])] = result["best"]
             self.progress.advance(result["trials"], f"best so far: {self.standing}")
 
     def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
-        """A run ended."""
+        """A run ended.
+
+        Args:
+            iteration: not used.
+            trials: not used.
+            trial: run that ended, as Tune knows it.
+            **_: not used.
+        """
         self.ended(RunKey(**trial.config["run"]))
 
     def on_trial_recover(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
-        """A run failed, and Tune tries it again."""
+        """A run failed, and Tune tries it again.
+
+        Args:
+            iteration: not used.
+            trials: not used.
+            trial: run that failed, as Tune knows it.
+            **_: not used.
+        """
         say(f"run {RunKey(**trial.config['run'])} failed and is tried again from its last trial")
 
     def __getstate__(self) -> dict[str, Any]:
@@ -100,6 +122,12 @@ class _FullDisk(Stopper):
 
 def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Watch) -> None:
     """Bring runs to their end, `slots` of them at the same time.
+
+    Args:
+        job: what all runs share.
+        missing: runs that are not whole.
+        slots: runs at the same time, one CPU each.
+        watch: is told of trials, and of runs that are over.
 
     Raises:
         UserError: runs kept failing, or the disk is full; what they finished is kept.

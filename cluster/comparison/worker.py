@@ -23,7 +23,7 @@ from workers.hardware import robots
 from workers.setups import Setup
 
 STEP_SECONDS = 1.0
-"""After which a worker reports: what a user sees as live, and some trials of any robot."""
+"""A worker reports after so long: a user sees that as live, and any robot makes some trials in it."""
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}
 
 

@@ -22,6 +22,11 @@ FORMATS: Mapping[str, Callable[[Dataset, Path], Iterator[Shard]]] = {
 def export(dataset: Dataset, form: str, out: Path) -> None:
     """Write a dataset in another format; the folder appears when it is complete.
 
+    Args:
+        dataset: whose episodes are written.
+        form: one of `FORMATS`.
+        out: folder that does not exist yet.
+
     Raises:
         UsageError: the format is unknown.
         UserError: the folder exists already, or the dataset is empty, damaged or overlapping.

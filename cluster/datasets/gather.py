@@ -29,10 +29,10 @@ _DISK = {
 }
 
 _ENDING_SECONDS = 10.0
-"""What a worker process may take to end once it was told to."""
+"""A worker process may take so long to end once it was told to."""
 
 LAST_REPORTS = 1024
-"""Reports that are kept; a plan is made from fewer."""
+"""So many reports are kept; a plan is made from fewer."""
 
 Outcome = Done[Shard, ShardReport] | Failed[Shard]
 
@@ -49,7 +49,18 @@ def rollout_pool(
     actor: type[RolloutActor] = RolloutActor,
     most: int = 0,
 ) -> Pool[Shard, ShardReport]:
-    """Actors that roll out shards of a dataset, one CPU each; as many more as become free, up to `most`."""
+    """Make a pool of actors that roll out shards of a dataset, one CPU each.
+
+    Args:
+        dataset: to which the shards belong.
+        settings: of the collection.
+        actors: how many there are at first.
+        actor: class of the rollout processes.
+        most: how many there may be, as CPUs become free; `actors` if that is more.
+
+    Returns:
+        The pool, whose actors start when it runs.
+    """
     remote: Any = ray.remote(actor)
     options = remote.options(num_cpus=1, max_restarts=0, max_task_retries=0)
     return Pool(
@@ -123,6 +134,11 @@ def _gather(
 
 def note_failure(failure: Failed[Shard], dataset: Dataset, counts: CollectionProgress) -> None:
     """Say it, keep its error, and put the shard aside after its last attempt.
+
+    Args:
+        failure: of one attempt.
+        dataset: to which the shard belongs.
+        counts: of the collection; its errors and retries are added to.
 
     Raises:
         UserError: it is the disk's fault, which no further attempt changes.

@@ -81,7 +81,15 @@ def metrics(expected: Forecast) -> dict[str, float]:
 
 
 def plan_text(expected: Forecast, done: int) -> str:
-    """The plan in words, each number with the half width of its interval."""
+    """Put the plan into words, each number with the half width of its interval.
+
+    Args:
+        expected: of the whole job.
+        done: episodes that the plan is made from.
+
+    Returns:
+        Text of several lines.
+    """
     core, wall, size, bad = expected.core_hours, expected.hours, expected.size, expected.badness
     lines = (
         f"the whole job of {expected.episodes} episodes on {expected.actors} actors, from its first {done}:",

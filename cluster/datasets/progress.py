@@ -13,7 +13,7 @@ from workers.dataset.shards import Shard
 
 WINDOW_SECONDS = 600.0
 LISTED = 4
-"""Machines that are named one by one; of more, the slowest and the fastest are."""
+"""Up to so many machines are named one by one; of more, the slowest and the fastest are."""
 
 
 @dataclass
@@ -31,7 +31,12 @@ class Rates:
     _episodes: dict[str, int] = field(default_factory=dict)
 
     def add(self, machine: str, episodes: int) -> None:
-        """Count episodes that a machine has just finished."""
+        """Count episodes that a machine has just finished.
+
+        Args:
+            machine: its name.
+            episodes: how many.
+        """
         self._finished.append((time.monotonic(), machine, episodes))
         self._episodes[machine] = self._episodes.get(machine, 0) + episodes
 
@@ -56,9 +61,9 @@ class Rates:
 
 
 RECORD_SECONDS = 30.0
+"""So long passes between two records: each is a few tens of ms in which the driver does nothing else."""
 CONSEQUENCE = "; the collection goes on, and its numbers are recorded at the end at the latest"
-"""What a person reads when the store fails meanwhile."""
-"""Between two records: each is a few tens of milliseconds in which the driver does nothing else."""
+"""A person reads this behind the store's error when the store fails meanwhile."""
 
 
 @dataclass

@@ -12,7 +12,16 @@ FOLDER = "quarantine"
 
 
 def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location:
-    """Keep the errors of a shard that was given up; the next `collect` tries it afresh."""
+    """Keep the errors of a shard that was given up; the next `collect` tries it afresh.
+
+    Args:
+        dataset: to which it belongs.
+        shard: what was given up.
+        errors: one text of each attempt.
+
+    Returns:
+        Where they are kept, as JSON.
+    """
     path = _path(dataset, shard)
     path.parent.mkdir(exist_ok=True)
     path.write_text(
@@ -22,13 +31,16 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
 
 
 def quarantined_shards(dataset: Dataset, episodes: int = sys.maxsize) -> list[Shard]:
-    """The shards put aside that are needed still.
+    """List the shards put aside that are needed still.
 
     A later collection may have cut their episodes into other shards, so what counts is the episodes.
 
     Args:
         dataset: to which they belong.
         episodes: how many it shall hold; those beyond are not needed.
+
+    Returns:
+        The shards, cut as they were when they were put aside, in the order of their names.
     """
     return [shard for shard in _put_aside(dataset) if _is_needed(dataset, shard, episodes)]
 

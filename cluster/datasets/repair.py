@@ -16,7 +16,14 @@ from workers.setups import Setup
 
 
 def recompute_shards(dataset: Dataset, count: int) -> list[Defect]:
-    """What is found wrong with that many random shards by rolling them out again.
+    """Roll some random shards out again, and see what is wrong with them.
+
+    Args:
+        dataset: from which they are drawn.
+        count: how many; all of them if there are fewer.
+
+    Returns:
+        A line for each defect.
 
     Raises:
         UserError: this machine would roll out other episodes.

@@ -9,7 +9,7 @@ from cluster.hardware.station import Station
 from cluster.hardware.status import Status
 
 RESOURCE = "hardware"
-"""What the robot's machine offers one of: one campaign at a time has a place there."""
+"""The robot's machine offers one of this resource: one campaign at a time has a place there."""
 
 PREFIX = "hardware-"
 
@@ -41,6 +41,9 @@ def actor_options(robot: str, namespace: str, lifetime: str) -> dict[str, Any]:
         robot: in the registry.
         namespace: that everybody who shares the robot uses.
         lifetime: "detached" where the cluster outlives the driver, so that a trial outlives it too.
+
+    Returns:
+        Keyword arguments for the `options` of the actor's class.
     """
     return {
         "name": f"{PREFIX}{robot}",

@@ -94,7 +94,15 @@ def recover(campaign: Campaign) -> None:
 
 
 def history(trials: tuple[CampaignTrial, ...], dimensions: int) -> History:
-    """What the method may learn from: measured trials; failed and aborted ones only as tried before."""
+    """Gather what the method may learn from.
+
+    Args:
+        trials: of the campaign, by number.
+        dimensions: D of the setup.
+
+    Returns:
+        Measured trials with their objective; failed and aborted ones with NaN, only as tried before.
+    """
     past = History.empty(dimensions)
     for trial in trials:
         if trial.state is State.MEASURED:
@@ -105,7 +113,15 @@ def history(trials: tuple[CampaignTrial, ...], dimensions: int) -> History:
 
 
 def objection(x: Float[np.ndarray, " n"], dimensions: int) -> str | None:
-    """Why a controller must not reach the robot; None when it may."""
+    """Say why a controller must not reach the robot.
+
+    Args:
+        x: controller, [n].
+        dimensions: D of the setup.
+
+    Returns:
+        The reason; None when it may.
+    """
     if x.shape != (dimensions,):
         return f"the controller must have {dimensions} parameters, got {x.size}"
     if not np.isfinite(x).all():
@@ -116,14 +132,33 @@ def objection(x: Float[np.ndarray, " n"], dimensions: int) -> str | None:
 
 
 def trial_id(journal: Journal, trial: CampaignTrial) -> str:
-    """The name by which the robot's ledger knows a trial."""
+    """Name a trial as the robot's ledger knows it.
+
+    Args:
+        journal: of the campaign.
+        trial: one of its trials.
+
+    Returns:
+        Name of the campaign and number of the trial.
+    """
     return f"{journal.name}-{trial.number:03d}"
 
 
 def record(
     journal: Journal, trial: CampaignTrial, new: State, who: str, body: Mapping[str, Any]
 ) -> CampaignTrial:
-    """Moves a trial on from exactly the version that the caller has seen, and returns what it became."""
+    """Moves a trial on from exactly the version that the caller has seen.
+
+    Args:
+        journal: of the campaign.
+        trial: as the caller has seen it.
+        new: the state it enters.
+        who: causes it.
+        body: what is particular to the transition.
+
+    Returns:
+        What the trial became.
+    """
     journal.record(trial.number, new, who, body, f"{trial.number}/{trial.version}/{new}")
     return journal.trial(trial.number)
 
@@ -168,7 +203,16 @@ def _approve_by_policy(campaign: Campaign, trial: CampaignTrial) -> CampaignTria
 
 
 def approve(journal: Journal, trial: CampaignTrial, who: str) -> CampaignTrial:
-    """Lets one trial onto the robot; the approval names the bytes of its controller."""
+    """Lets one trial onto the robot; the approval names the bytes of its controller.
+
+    Args:
+        journal: of the campaign.
+        trial: as the caller has seen it.
+        who: approves.
+
+    Returns:
+        What the trial became.
+    """
     return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256})
 
 

@@ -50,6 +50,9 @@ def at_the_robot(options: dict[str, Any], plan: CampaignPlan, say: Say) -> Itera
         plan: what to carry out.
         say: is told what the command waits for.
 
+    Yields:
+        Handle of the actor, and how the campaign stood when the plan was entered.
+
     Raises:
         UserError: when there is no place on the robot's machine, or the plan cannot be carried out.
     """

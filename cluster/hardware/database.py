@@ -78,7 +78,15 @@ def sqlite_errors(path: Path) -> Iterator[None]:
 
 
 def corrupt(path: Path, what: str) -> JournalCorrupt:
-    """The error for a damaged journal."""
+    """The error for a damaged journal.
+
+    Args:
+        path: of the journal.
+        what: is wrong with it.
+
+    Returns:
+        The error, to be raised.
+    """
     return JournalCorrupt(
         f"the journal {path} is damaged: {what}; nothing will be granted. Keep the file, "
         "restore a copy of it, or start a campaign in another folder"

@@ -44,6 +44,9 @@ def start(
         report: is given every new state of the campaign.
         say: is given sentences for the person in charge.
 
+    Returns:
+        How the campaign stands at its end.
+
     Raises:
         UserError: when the campaign cannot go on without a person; the message says what they must do.
     """

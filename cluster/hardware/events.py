@@ -114,7 +114,15 @@ class CampaignTrial:
 
 
 def apply_event(trial: CampaignTrial | None, event: Event) -> CampaignTrial:
-    """The trial after one more event."""
+    """Add one more event to a trial.
+
+    Args:
+        trial: so far; None before its proposal.
+        event: its next one.
+
+    Returns:
+        The trial after it.
+    """
     body = json.loads(event.body)
     if trial is None:
         x_hex = body["x"]
@@ -134,11 +142,14 @@ def replay(events: Iterable[Event]) -> dict[int, CampaignTrial]:
 
 
 def broken_link(events: Iterable[Event], genesis: str) -> str | None:
-    """Where the hash chain breaks, in words; None when it is whole.
+    """Look for the place where the hash chain breaks.
 
     Args:
         events: in order.
         genesis: the hash that the first event must follow.
+
+    Returns:
+        What is wrong there, in words; None when the chain is whole.
     """
     prev = genesis
     for position, event in enumerate(events, start=1):

@@ -92,6 +92,9 @@ class Journal:
             who: proposes it.
             facts: what the proposal was computed from.
 
+        Returns:
+            The event; for equal content, the one that is already there.
+
         Raises:
             KeyReused: when the trial exists with other content.
         """
@@ -108,6 +111,9 @@ class Journal:
             who: causes it.
             body: what is particular to the transition; `f` and `y` for a measurement.
             idem: key of this request; with equal content it answers with the event that is already there.
+
+        Returns:
+            The event, new or already there.
 
         Raises:
             IllegalTransition: when the trial's state does not allow it.

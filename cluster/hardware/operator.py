@@ -37,6 +37,9 @@ def approve(folder: Path, trial: int, who: str) -> CampaignTrial:
         trial: its number.
         who: approves; recorded for good.
 
+    Returns:
+        The approved trial.
+
     Raises:
         IllegalTransition: when the trial does not wait for approval.
     """
@@ -57,6 +60,9 @@ def resolve(
         note: why; recorded for good.
         f: objective of a measured trial; None otherwise.
         y: badness in [0, 1] of a measured trial; None otherwise.
+
+    Returns:
+        The trial with its outcome.
 
     Raises:
         UsageError: when an argument is missing, too much, or out of its range.

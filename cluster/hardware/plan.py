@@ -40,7 +40,7 @@ class CampaignPlan:
 def identify(
     robot: str, method: str, trials: int, seed: int, pool: int, model: Path | None, approval: Approval
 ) -> CampaignIdentity:
-    """What a campaign with these arguments is.
+    """Check the arguments of a campaign, and make its identity of them.
 
     Args:
         robot: in the registry.
@@ -50,6 +50,9 @@ def identify(
         pool: number of random controllers the method chooses from, at least 1.
         model: checkpoint; ignored by methods without a model.
         approval: who approves.
+
+    Returns:
+        The identity; its model is "" where the method needs none.
 
     Raises:
         UsageError: when a name or number is none that exists; the message names the nearest.

@@ -43,7 +43,15 @@ TERMINAL = frozenset({State.MEASURED, State.FAILED, State.ABORTED, State.REJECTE
 
 
 def is_legal(old: State | None, new: State) -> bool:
-    """Whether a trial in `old` (None: it does not exist yet) may become `new`."""
+    """Whether a trial may go from one state to another.
+
+    Args:
+        old: state before; None where the trial does not exist yet.
+        new: state after.
+
+    Returns:
+        True where `LEGAL` has the transition.
+    """
     return new in LEGAL[old]
 
 

@@ -11,7 +11,7 @@ from cluster.hardware.lock import Process
 from cluster.hardware.states import TERMINAL, Approval, State
 
 RANDOM_TRIALS = 2
-"""Measured before the first suggestion, as in the paper's hardware runs."""
+"""So many random trials are measured before the first suggestion, as in the paper's hardware runs."""
 
 
 class Phase(StrEnum):
@@ -25,11 +25,14 @@ class Phase(StrEnum):
 
 
 def phase_of(trials: tuple[CampaignTrial, ...], identity: CampaignIdentity) -> Phase:
-    """What a campaign needs next, as a function of its trials alone.
+    """Tell what a campaign needs next, from its trials alone.
 
     Args:
         trials: of the campaign, by number.
         identity: of the campaign.
+
+    Returns:
+        The phase; it is RUNNING also where the process that ran the trial is dead.
     """
     state = next((trial.state for trial in trials if trial.state not in TERMINAL), None)
     if state is State.UNKNOWN:
@@ -96,6 +99,9 @@ def status(journal: Journal, executor: Process | None) -> Status:
     Args:
         journal: of the campaign.
         executor: the live process that executes it; None when there is none.
+
+    Returns:
+        Phase, trials and advice.
     """
     trials = journal.trials()
     now = phase_of(trials, journal.identity)

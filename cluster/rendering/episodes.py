@@ -19,13 +19,16 @@ FORMS = "random:SEED, dataset:FOLDER:INDEX, the path of an .npy file, or numbers
 
 
 def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
-    """The episode of a controller; one of a dataset comes as it was recorded.
+    """Find the episode of a dataset, or roll a controller out.
 
     Args:
         wanted: one of `FORMS`.
         setup: what runs the controller.
         seed: of the physics, drawn from the ranges of data collection. Without it an episode of a dataset
             keeps its own, and other controllers run under the nominal physics.
+
+    Returns:
+        The episode; one of a dataset is as it was recorded, unless a seed is given.
 
     Raises:
         UsageError: there is no such controller.
@@ -40,7 +43,15 @@ def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
 
 
 def first_physics(setup: Setup, seed: int) -> Physics:
-    """The physics of episode 0 of a dataset with that seed."""
+    """Draw the physics of episode 0 of a dataset.
+
+    Args:
+        setup: whose ranges of data collection they are drawn from.
+        seed: of the dataset.
+
+    Returns:
+        The parameters, by name.
+    """
     return setup.physics.draw(generator(seed, Stream.PHYSICS, 0))
 
 

@@ -26,13 +26,16 @@ _INK, _PAPER = (20, 24, 32), (250, 250, 250)
 def caption(
     picture: UInt8[np.ndarray, "height width 3"], corner: str, note: str, conditions: tuple[str, ...]
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """A copy of the picture with text on it.
+    """Write text on a picture.
 
     Args:
         picture: red, green and blue.
         corner: written at the top left.
         note: written at the top right.
         conditions: the bad conditions that hold, written at the bottom; any of them draws the border.
+
+    Returns:
+        A copy of the picture with the text on it.
     """
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image)
@@ -50,7 +53,15 @@ def caption(
 def add_title(
     picture: UInt8[np.ndarray, "height width 3"], title: str
 ) -> UInt8[np.ndarray, "taller width 3"]:
-    """The picture below a white strip with a title, which is cut where it is wider."""
+    """Put a picture below a white strip with a title.
+
+    Args:
+        picture: red, green and blue.
+        title: cut where it is wider than the picture.
+
+    Returns:
+        The whole, `TITLE` pixels taller.
+    """
     font = ImageFont.load_default(TITLE // 2 + 2)
     strip = Image.new("RGB", (picture.shape[1], TITLE), _PAPER)
     ImageDraw.Draw(strip).text((4, TITLE // 2), title, fill=_INK, font=font, anchor="lm")
@@ -76,7 +87,16 @@ class Moment:
 
 
 def drawable(setup: Setup, out: Path, width: int, height: int) -> Size:
-    """The size of each picture, once it is clear that there is something to see and that it can be written.
+    """Make sure that there is something to see, and that it can be written.
+
+    Args:
+        setup: what is drawn.
+        out: file of the pictures; its suffix is the kind.
+        width: of each picture, in pixels.
+        height: of each picture, in pixels.
+
+    Returns:
+        The size of each picture.
 
     Raises:
         UsageError: the size or the kind of the file is impossible, or there is nothing to see.
@@ -98,13 +118,16 @@ def usual_speed(setup: Setup) -> float:
 
 
 def clip(setup: Setup, episode: Episode, speed: float, rate: int) -> list[Moment]:
-    """Moments evenly over an episode; each tells every condition that held since the one before.
+    """Choose the moments of a clip, evenly over an episode.
 
     Args:
         setup: of the episode.
         episode: the episode.
         speed: 1 is that of life.
         rate: pictures per second.
+
+    Returns:
+        The moments in order; each tells every condition that held since the one before.
 
     Raises:
         UsageError: the speed is no positive number, or asks for more pictures than the episode has steps.
@@ -124,7 +147,16 @@ def clip(setup: Setup, episode: Episode, speed: float, rate: int) -> list[Moment
 
 
 def stills(setup: Setup, episode: Episode, count: int) -> list[Moment]:
-    """Moments evenly over an episode, its first and last step among them; each tells what holds just then."""
+    """Choose the moments of stills, evenly over an episode.
+
+    Args:
+        setup: of the episode.
+        episode: the episode.
+        count: how many, at least 1.
+
+    Returns:
+        The moments in order, from the first step to the last; each tells what holds just then.
+    """
     steps = np.rint(np.linspace(0, setup.horizon - 1, count)).astype(int).tolist()
     return [Moment(step, conditions_in(setup, episode.bad[step : step + 1])) for step in steps]
 
@@ -132,7 +164,18 @@ def stills(setup: Setup, episode: Episode, count: int) -> list[Moment]:
 def pictures(
     setup: Setup, episode: Episode, moments: Sequence[Moment], size: Size, note: str
 ) -> Iterator[Picture]:
-    """The moments of an episode as pictures, with time, conditions and the note written on them."""
+    """Draw moments of an episode.
+
+    Args:
+        setup: of the episode.
+        episode: the episode.
+        moments: to draw.
+        size: of each picture.
+        note: written at the top right.
+
+    Yields:
+        A picture of each moment, with time, conditions and the note written on it.
+    """
     steps = [moment.step for moment in moments]
     drawn = frames(setup, episode.xi, steps, size)
     with ProgressLine("pictures", len(steps), 0) as progress:
@@ -143,7 +186,15 @@ def pictures(
 
 
 def conditions_in(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
-    """The bad conditions that hold in any of some steps; a graded one with its greatest degree."""
+    """Tell which bad conditions hold in any of some steps.
+
+    Args:
+        setup: whose conditions they are.
+        bad: of at least one step, [n]: bits of the conditions, or degrees in [0, 1] where G_bad is graded.
+
+    Returns:
+        Their names; a graded one comes with its greatest degree.
+    """
     if bad.dtype == np.float32:
         degree = float(bad.max())
         return (f"{setup.conditions[0]} {degree:.0%}",) if degree > 0.0 else ()
@@ -152,7 +203,15 @@ def conditions_in(setup: Setup, bad: np.ndarray) -> tuple[str, ...]:
 
 
 def summary(setup: Setup, episode: Episode) -> str:
-    """One line: objective, badness, which conditions made it, and why the episode stopped."""
+    """Sum an episode up in one line.
+
+    Args:
+        setup: of the episode.
+        episode: the episode.
+
+    Returns:
+        Objective, badness, which conditions made it, and why the episode stopped.
+    """
     reasons = conditions_in(setup, episode.bad)
     stopped = f"; stopped: {episode.stop}" if episode.stop else ""
     because = f" ({', '.join(reasons)})" if reasons else ""

@@ -48,7 +48,16 @@ class ModelView:
 
 
 def model_view(title: str, episode: Episode, model: SvaeDc, stride: int) -> ModelView:
-    """What a model makes of an episode.
+    """Let a model reconstruct an episode, and generate it from its controller.
+
+    Args:
+        title: written above.
+        episode: with all control steps.
+        model: in evaluation mode.
+        stride: control steps between two of the model's.
+
+    Returns:
+        The episode, and what the model makes of it.
 
     Raises:
         ValueError: the episode is not of the sizes that the model was trained on.
@@ -67,7 +76,17 @@ def model_view(title: str, episode: Episode, model: SvaeDc, stride: int) -> Mode
 
 
 def strips(setup: Setup, shown: ModelView, moments: Sequence[Moment], size: Size) -> Iterator[Picture]:
-    """For every moment the pictures of original, reconstruction and generation side by side."""
+    """Draw original, reconstruction and generation of an episode side by side.
+
+    Args:
+        setup: of the episode.
+        shown: the episode, and what the model makes of it.
+        moments: to draw.
+        size: of each picture of a strip.
+
+    Yields:
+        A strip for each moment.
+    """
     slow = replace(setup, control_step=setup.control_step * shown.stride)
     last = shown.told[0].xi.shape[1] - 1
     at = [moment.step for moment in moments]
@@ -87,7 +106,15 @@ def strips(setup: Setup, shown: ModelView, moments: Sequence[Moment], size: Size
 
 
 def board(titles: Sequence[str], blocks: Sequence[Sequence[Picture]]) -> UInt8[np.ndarray, "tall wide 3"]:
-    """Blocks of strips, each below its title and apart from the next, in rows of two."""
+    """Arrange blocks of strips in rows of two, each below its title and apart from the next.
+
+    Args:
+        titles: one for each block.
+        blocks: strips that stand below each other; all blocks have as many, all strips one size.
+
+    Returns:
+        One picture; a place left over is white.
+    """
     margin = ((0, 0), (0, GAP), (0, 0))
     apart = [
         np.pad(add_title(mosaic(block, 1), title), margin, constant_values=255)
@@ -99,7 +126,7 @@ def board(titles: Sequence[str], blocks: Sequence[Sequence[Picture]]) -> UInt8[n
 def beside(
     setup: Setup, episode: Episode, folder: Path, moments: Sequence[Moment], size: Size, kind: str
 ) -> Iterator[Picture]:
-    """The pictures of an episode beside what the model of a folder makes of it.
+    """Draw an episode beside what the model of a folder makes of it.
 
     Args:
         setup: of the episode.
@@ -108,6 +135,9 @@ def beside(
         moments: to show.
         size: of each of the three pictures of a moment.
         kind: of the file they are for: stills stand below each other in one picture.
+
+    Returns:
+        The pictures, each drawn when it is asked for: one of all moments for stills, one of each for a clip.
 
     Raises:
         UserError: there is no such model, or it is of another setup.
@@ -174,6 +204,9 @@ def write_model_frames(folder: Path, tellings: Sequence[ModelView], setup: Setup
         tellings: of episodes of the setup.
         setup: that the episodes are of.
         count: moments of the clip; the stills have the last of each third.
+
+    Returns:
+        Paths of the stills and of the clip.
 
     Raises:
         LookupError: there is nothing to see.

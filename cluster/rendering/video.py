@@ -62,7 +62,15 @@ def write(path: Path, kind: str, pictures: Iterator[Picture], rate: int) -> None
 
 
 def mosaic(pictures: Sequence[Picture], columns: int) -> UInt8[np.ndarray, "tall wide 3"]:
-    """Pictures in rows, from the top left; places left over are white."""
+    """Arrange pictures in rows, from the top left.
+
+    Args:
+        pictures: at least one, all of one size.
+        columns: pictures in a row, at most.
+
+    Returns:
+        One picture; places left over are white.
+    """
     height, width, _ = pictures[0].shape
     rows = -(-len(pictures) // columns)
     columns = min(columns, len(pictures))

@@ -80,14 +80,23 @@ _ROW = 400  # bytes of one trial in its run's record
 
 
 def collecting(setup: str, episodes: int, cores: int) -> Cost:
-    """Rolling out and storing episodes."""
+    """Estimate what rolling out and storing episodes costs.
+
+    Args:
+        setup: whose episodes.
+        episodes: how many.
+        cores: that roll out at the same time.
+
+    Returns:
+        CPU time, wall time on those cores, and bytes of the episodes.
+    """
     one = _EPISODES[setup]
     seconds = one.seconds * episodes
     return Cost(seconds, seconds / cores, float(one.size * episodes))
 
 
 def training(setup: str, preset: str, latent: str, updates: int, cache: int) -> Cost:
-    """Gradient updates, on one thread; a GPU or further threads make them faster.
+    """Estimate what gradient updates cost on one thread; a GPU or further threads make them faster.
 
     Args:
         setup: whose episodes.
@@ -95,13 +104,16 @@ def training(setup: str, preset: str, latent: str, updates: int, cache: int) -> 
         latent: size of the latent path.
         updates: of all stages.
         cache: bytes of the decoded episodes.
+
+    Returns:
+        CPU time, as much wall time, and bytes of the cache.
     """
     seconds = _UPDATES[setup, preset, latent] * updates
     return Cost(seconds, seconds, float(cache))
 
 
 def comparing(setup: str, methods: Iterable[str], runs: Mapping[str, float], trials: int, slots: int) -> Cost:
-    """Simulated runs, with what their methods think between trials.
+    """Estimate what simulated runs cost, with what their methods think between trials.
 
     Args:
         setup: whose trials; one without a simulator costs nothing.
@@ -109,6 +121,9 @@ def comparing(setup: str, methods: Iterable[str], runs: Mapping[str, float], tri
         runs: still to be done of each method; a part of one counts as such.
         trials: of a run, the random ones included.
         slots: runs at the same time.
+
+    Returns:
+        CPU time, wall time over the slots, and bytes of the runs' records.
     """
     episode = _EPISODES[setup].seconds if setup in _EPISODES else 0.0
     seconds = sum(
@@ -133,7 +148,16 @@ class Item:
 
 
 def bill(reproduction: Reproduction, settings: Settings, cores: int) -> list[Item]:
-    """All steps of a reproduction, with what is left of each."""
+    """List all steps of a reproduction, with what is left of each.
+
+    Args:
+        reproduction: that is billed.
+        settings: of all steps.
+        cores: it will run on.
+
+    Returns:
+        Data, models and panels, in this order.
+    """
     return [
         *_data(reproduction, settings, cores),
         *_models(reproduction, settings),
@@ -142,12 +166,15 @@ def bill(reproduction: Reproduction, settings: Settings, cores: int) -> list[Ite
 
 
 def lines(reproduction: Reproduction, items: Sequence[Item], cores: int) -> Iterator[str]:
-    """The bill in words.
+    """Put the bill into words.
 
     Args:
         reproduction: that is billed.
         items: its steps.
         cores: it will run on.
+
+    Yields:
+        A heading, a line for each step and one for all of them, and a remark on the machine.
     """
     free = shutil.disk_usage(_existing(reproduction.folder)).free
     total = Item("in all", reduce(add, (item.cost for item in items), Cost()))

@@ -7,7 +7,7 @@ from svaedc.bo import methods
 from workers.hardware import robots
 
 NINE, THIRTY = "3x3", "5x6"
-"""Latent spaces, steps x dimensions: the paper's usual one, and its larger one (section 7.1)."""
+"""These are latent spaces, steps x dimensions: the paper's usual one, and its larger one (section 7.1)."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,8 @@ SCALES: Final[Mapping[str, Scale]] = MappingProxyType(
         "paper": Scale("paper", dict.fromkeys(_DATA, 500_000)),
     }
 )
-"""`paper`: sections 6.1 and 7.1, on a cluster with GPUs. `machine`: an hour or two of two cores."""
+"""`paper` is that of sections 6.1 and 7.1, on a cluster with GPUs. `machine` takes an hour or two of two
+cores."""
 
 
 def scale(name: str) -> Scale:
@@ -98,7 +99,15 @@ class Reproduction:
         return latent not in self.trains or (self.models[latent] / MEASURES).exists()
 
     def training(self, settings: TrainSettings, latent: str) -> TrainSettings:
-        """The settings of training for a size of the latent path."""
+        """Adapt the settings of training to a size of the latent path.
+
+        Args:
+            settings: of all trainings.
+            latent: steps x dimensions.
+
+        Returns:
+            The same settings for `NINE`; otherwise a copy with that size.
+        """
         return settings if latent == NINE else settings.model_copy(update={"latent": latent})
 
     def updates(self, settings: TrainSettings) -> int:
@@ -129,7 +138,7 @@ def resolve(
     dataset: Location | None,
     models: tuple[Path, ...],
 ) -> Reproduction:
-    """A reproduction with every open choice made.
+    """Make every open choice of a reproduction.
 
     Args:
         recipe: of the figure.
@@ -137,8 +146,11 @@ def resolve(
         folder: of everything.
         episodes: to collect.
         runs: of each method.
-        dataset: that is there already.
+        dataset: that is there already; None to collect one.
         models: that are there already; what each is for follows from its latent size.
+
+    Returns:
+        What `run_steps` does.
 
     Raises:
         UserError: a dataset or model cannot be read, or is of another setup or size.

@@ -78,12 +78,15 @@ class Table:
 
 
 def table(recipe: Recipe, summaries: Mapping[str, Summary], initial: int) -> Table:
-    """What comparisons say of a recipe's claims.
+    """Hold comparisons against a recipe's claims.
 
     Args:
         recipe: of the figure.
         summaries: of its panels, by name.
         initial: shared random trials of their runs.
+
+    Returns:
+        One entry for every number that a claim rests on.
     """
     return Table(
         recipe,
@@ -97,6 +100,13 @@ def table(recipe: Recipe, summaries: Mapping[str, Summary], initial: int) -> Tab
 
 def publish(reproduction: Reproduction, found: Table) -> tuple[Path, Path]:
     """Write the table beside its panels, as Markdown and as JSON.
+
+    Args:
+        reproduction: whose results they are.
+        found: the table.
+
+    Returns:
+        Paths of the Markdown and of the JSON.
 
     Raises:
         UserError: the folder cannot be written.

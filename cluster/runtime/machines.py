@@ -9,7 +9,7 @@ from ray.exceptions import RpcError
 from cluster.runtime.ray_internals import actor_facts
 
 KNOCK_SECONDS = 2.0
-"""How long a machine has to answer; Ray itself takes a quarter of a minute to miss one."""
+"""A machine has so long to answer; Ray itself takes a quarter of a minute to miss one."""
 
 
 def own_machine() -> str:

@@ -10,7 +10,7 @@ from ray.exceptions import RayError
 
 _POLL_SECONDS = 0.5
 _FAREWELL_SECONDS = 5.0
-"""How long an interrupted block waits for what `receive` is doing."""
+"""An interrupted block waits so long for what `receive` is doing."""
 
 
 class Mailbox:

@@ -70,6 +70,9 @@ def place(
         machines: what is free.
         device: `auto` gives each process a GPU where the cluster has any.
 
+    Returns:
+        The placement; with `all`, processes have as many CPUs as still fit.
+
     Raises:
         UserError: there is no room, or no GPU, with what is free and the remedy.
     """

@@ -18,13 +18,13 @@ SETTINGS: Mapping[str, Any] = {
     # Counters that every process exports every ten seconds, for the dashboard and Prometheus.
     "enable_metrics_collection": False,
 }
-"""Of all of Ray's processes. The user's own, RAY_<name> in the environment, come first."""
+"""All of Ray's processes have these. The user's own, RAY_<name> in the environment, come first."""
 
 AGENT: Mapping[str, str] = {
     # The agent, without which no raylet lives, looks at every process so often; by default every 5 s.
     "REPORTER_UPDATE_INTERVAL_MS": "3600000",
 }
-"""Of the agent, which knows them by its environment only."""
+"""The agent has these, and knows them by its environment only."""
 
 
 def settings() -> dict[str, Any]:

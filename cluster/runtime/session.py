@@ -20,9 +20,9 @@ from cluster.runtime.signals import terminating_as_exit
 
 LOOPBACK = "127.0.0.1"
 ATTEMPTS = 3
-"""To start a cluster on a machine that is too busy for it."""
+"""A cluster is started at most so many times on a machine that is too busy for it."""
 TOO_SLOW = "timed out during startup"
-"""What Ray then says."""
+"""Ray says this on such a machine."""
 TOKEN_REMEDY = (
     "put the cluster's token into ~/.ray/auth_token, or name its file in RAY_AUTH_TOKEN_PATH, "
     "and set RAY_AUTH_MODE=token"
@@ -34,13 +34,13 @@ class Session:
     """A cluster that is connected; `ray.*` works until the block that opened it ends."""
 
     address: str
-    """Host and port of the cluster's head."""
+    """The cluster's head has this host and port."""
     is_local: bool
-    """Whether this command started the cluster, which then ends with it."""
+    """It is true where this command started the cluster, which then ends with it."""
     cpus: int
-    """CPUs of all its machines that were free when it was joined; a submitted job may hold one itself."""
+    """So many CPUs of all its machines were free when it was joined; a submitted job may hold one itself."""
     gpus: int = 0
-    """GPUs of all its machines that were free when it was joined."""
+    """So many GPUs of all its machines were free when it was joined."""
 
     def preflight(self, cpus_required: int) -> None:
         """Refuses work that the cluster has no room for: Ray would wait for ever, in silence.
@@ -74,6 +74,9 @@ def connect(
         address: `host:port`, `auto` for the one running on this machine, or None: then the cluster of the
             environment's RAY_ADDRESS, which Ray sets inside a submitted job, or a new one.
         parts: of a new one; each costs CPU time for as long as the cluster lives.
+
+    Yields:
+        The connected cluster.
 
     Raises:
         UserError: the cluster is unreachable, refuses the token, or cannot be started.

@@ -46,9 +46,9 @@ def terminating_as_exit() -> Iterator[None]:
 
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+"""A command ends with this exit code after Ctrl-C."""
 KEPT = "everything finished is kept, and the same command goes on from here"
-"""What stopping means for nearly all commands."""
+"""Stopping means this for nearly all commands."""
 
 
 @contextmanager

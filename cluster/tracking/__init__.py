@@ -6,11 +6,11 @@ global state, so two trackers never disturb each other, and it turns a failing s
 
 import os
 
+# Read while MLflow is imported, so it comes first: nothing here reports home.
+os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+
 from cluster.tracking.models import log_model
 from cluster.tracking.runs import UI_PORT, Run, Tracker
 from cluster.tracking.store import open_tracker
-
-# Read while MLflow is imported, so it comes first: nothing here reports home.
-os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
 
 __all__ = ["UI_PORT", "Run", "Tracker", "log_model", "open_tracker"]

@@ -15,7 +15,7 @@ from cluster.errors import UserError
 from cluster.progress import say
 
 PAUSE_SECONDS = 30.0
-"""Half of the pause after the store's first failure."""
+"""The pause after the store's first failure is twice as long."""
 
 
 class Recorder:

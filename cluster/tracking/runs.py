@@ -23,12 +23,12 @@ from cluster.errors import UserError
 from workers.dataset.storage.location import Location
 
 UI_PORT = 5000
-"""Where `svaedc ui` serves a SQLite store unless told otherwise; a run's link points there."""
+"""`svaedc ui` serves a SQLite store here unless told otherwise; a run's link points there."""
 METRICS_PER_REQUEST = 1000
 PARAMETERS_PER_REQUEST = 100
 PARAMETER_LENGTH = 6000
 DIGEST_LENGTH = 36
-"""MLflow's limits; a longer fingerprint is kept whole in the tag `svaedc.dataset`."""
+"""These four are MLflow's limits; a longer fingerprint is kept whole in the tag `svaedc.dataset`."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,21 @@ class Run:
         return f"{self.tracker.page}/{self.id}"
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
-        """Records numbers at one step, in one request; undefined ones (NaN, infinite) are left out."""
+        """Records numbers at one step, in one request; undefined ones (NaN, infinite) are left out.
+
+        Args:
+            values: numbers by name.
+            step: of all of them.
+        """
         self.curves({name: [value] for name, value in values.items()}, first_step=step)
 
     def curves(self, values: Mapping[str, Sequence[float]], first_step: int = 0) -> None:
-        """Records whole curves, one value per step from `first_step` on, in as few requests as can be."""
+        """Records whole curves in as few requests as can be; undefined values are left out.
+
+        Args:
+            values: curves by name, one value per step.
+            first_step: of the first value of each.
+        """
         now = int(time.time() * 1000)
         points = [
             Metric(name, float(value), now, first_step + offset)
@@ -76,7 +86,12 @@ class Run:
             self.tracker.client.log_artifact(self.id, str(path))
 
     def dict(self, name: str, content: Mapping[str, Any]) -> None:
-        """Keeps a summary as `<name>.json`."""
+        """Keeps a summary as a JSON file.
+
+        Args:
+            name: of the file, without its suffix.
+            content: plain values by name.
+        """
         with self.tracker.reaching():
             self.tracker.client.log_dict(self.id, {**content}, f"{name}.json")
 
@@ -97,7 +112,15 @@ class Run:
         self.tags({"svaedc.dataset": fingerprint})
 
     def child(self, name: str, parameters: Mapping[str, Any]) -> "Run":
-        """Starts a run that MLflow shows beneath this one."""
+        """Starts a run that MLflow shows beneath this one.
+
+        Args:
+            name: shown in the list.
+            parameters: settings of the run; nested mappings become dotted names.
+
+        Returns:
+            The new run.
+        """
         return self.tracker.run(name, "child", parameters, {"mlflow.parentRunId": self.id})
 
     def __enter__(self) -> "Run":
@@ -141,6 +164,9 @@ class Tracker:
             kind: the command, as the tag `svaedc.kind`.
             parameters: settings of the run; nested mappings become dotted names.
             tags: further tags.
+
+        Returns:
+            The new run, which the end of its `with` block ends.
 
         Raises:
             UserError: the store cannot be written.
@@ -188,7 +214,15 @@ class Tracker:
 
 
 def unusable(uri: str, error: Exception) -> UserError:
-    """The message for a store that failed, with its first line of explanation and the remedy."""
+    """The message for a store that failed, with the remedy.
+
+    Args:
+        uri: of the store.
+        error: what it raised; its first line is told.
+
+    Returns:
+        The error, to be raised.
+    """
     reason = str(error).strip().partition("\n")[0] or type(error).__name__
     return UserError(
         f"the MLflow store {uri} cannot be used: {reason}; make it writable and reachable, "

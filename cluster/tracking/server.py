@@ -17,7 +17,7 @@ from cluster.tracking import UI_PORT, open_tracker
 
 HOST = "127.0.0.1"
 PR_SET_PDEATHSIG = 1
-"""Linux's `prctl` option: the signal a process gets when its parent dies."""
+"""This option of Linux's `prctl` sets the signal that a process gets when its parent dies."""
 START_SECONDS = 120.0
 STOP_SECONDS = 10.0
 

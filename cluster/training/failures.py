@@ -15,7 +15,7 @@ from torch.distributed import DistError
 from cluster.runtime.ray_internals import health_check_failure, is_train_error
 
 _TRANSPORTS = ("gloo", "nccl")
-"""Named by the plain RuntimeErrors in which torch says that another process no longer answers."""
+"""Torch names one of these in the plain RuntimeErrors which say that another process no longer answers."""
 
 
 def is_death(error: TrainingFailedError) -> bool:
@@ -33,11 +33,14 @@ def is_death(error: TrainingFailedError) -> bool:
 
 
 def explanation(error: TrainingFailedError, model: Path) -> str:
-    """One sentence and the remedy.
+    """Say why a training ended.
 
     Args:
         error: that ended the training.
         model: folder of the model.
+
+    Returns:
+        One sentence and the remedy.
     """
     causes = _causes(error) or [error]
     if is_death(error):

@@ -15,17 +15,20 @@ from svaedc.model.svae_dc import SvaeDc
 from workers.dataset.identity import Identity
 
 SHOWN = 2_000
-"""Points that a scatter can show before it becomes a blot."""
+"""A scatter can show so many points before it becomes a blot."""
 
 
 def latent_space(path: Path, model: SvaeDc, held_out: Episodes, f: Float[np.ndarray, " episodes"]) -> Path:
-    """Latent paths of held-out controllers along their two widest directions, coloured by y and by f.
+    """Draw held-out controllers' latent paths along their two widest directions, coloured by y and by f.
 
     Args:
         path: of the PNG.
         model: in evaluation mode.
         held_out: episodes.
-        f: their objective.
+        f: their objective, [episodes].
+
+    Returns:
+        Path of the PNG.
     """
     chosen = _positions(held_out)
     with torch.no_grad():
@@ -46,7 +49,16 @@ def latent_space(path: Path, model: SvaeDc, held_out: Episodes, f: Float[np.ndar
 
 
 def badness(path: Path, model: SvaeDc, held_out: Episodes) -> Path:
-    """Predicted against true badness of held-out episodes: from the trajectory, and from x alone."""
+    """Draw predicted against true badness of held-out episodes: from the trajectory, and from x alone.
+
+    Args:
+        path: of the PNG.
+        model: that knows of badness, in evaluation mode.
+        held_out: episodes.
+
+    Returns:
+        Path of the PNG.
+    """
     batch = held_out.gather(_positions(held_out), torch.device("cpu"))
     with torch.no_grad():
         _, psi = model.split(model.posterior(batch.xi, batch.bad, batch.y).loc)
@@ -83,7 +95,17 @@ def _save(figure: Figure, path: Path) -> Path:
 
 
 def reconstruction(path: Path, model: SvaeDc, held_out: Episodes, identity: Identity) -> Path:
-    """Original, reconstructed and generated channels of four held-out episodes, least bad to worst."""
+    """Draw channels of four held-out episodes, least bad to worst: original, reconstructed, generated.
+
+    Args:
+        path: of the PNG.
+        model: in evaluation mode.
+        held_out: episodes.
+        identity: of their dataset, for channels and time.
+
+    Returns:
+        Path of the PNG.
+    """
     order = np.argsort(held_out.y[held_out.rows])
     chosen = order[np.linspace(0, len(order) - 1, 4).astype(int)]
     batch = [held_out.gather(np.array([position]), torch.device("cpu")) for position in chosen]

@@ -24,16 +24,24 @@ from cluster.training.reports import Reports
 from cluster.training.worker import TrainingJob, run_worker
 
 DEATHS = 3
-"""Deaths of training processes that one command survives, each from the last checkpoint."""
+"""One command survives so many deaths of training processes, each from the last checkpoint."""
 _STARTS = 2
-"""Starts of the processes that Ray Train tries anew; each waits a minute for its room."""
+"""Ray Train tries so many starts of the processes anew; each waits a minute for its room."""
 
 
 def placement_of(settings: TrainSettings, machines: Sequence[FreeNode]) -> Placement:
-    """How many processes of which size train; fewer than asked for where that is allowed and room is scarce.
+    """Decide how many processes of which size train.
+
+    Args:
+        settings: of the training.
+        machines: what is free.
+
+    Returns:
+        The placement; fewer processes than asked for will do where `least_workers` allows it.
 
     Raises:
         UserError: there is no room, or no GPU, with what is free and the remedy.
+        UsageError: `least_workers` is larger than `workers`.
     """
     if settings.least_workers == "all":
         return place(settings.workers, settings.threads, machines, settings.device)
@@ -48,6 +56,12 @@ def placement_of(settings: TrainSettings, machines: Sequence[FreeNode]) -> Place
 
 def submit(job: TrainingJob, placement: Placement, progress: ProgressLine, run: Run) -> None:
     """Train until the job's budget or time limit is spent.
+
+    Args:
+        job: what the training processes get.
+        placement: how many of which size.
+        progress: where updates are shown.
+        run: of MLflow, which records the reports.
 
     Raises:
         UserError: training failed, or, once it has ended, the MLflow store still fails.

@@ -80,7 +80,15 @@ def _pictures(job: TrainingJob, model: SvaeDc, cache: TrainingCache, dataset: Da
 
 
 def read_record(folder: Path, update: int) -> dict[str, Any] | None:
-    """The measures of the model in a folder if they were recorded after that many updates."""
+    """Read the measures of the model in a folder.
+
+    Args:
+        folder: of the model.
+        update: updates after which they must have been recorded.
+
+    Returns:
+        What `metrics.json` holds; None where there is none of so many updates.
+    """
     summary = read_json(folder / MEASURES)
     return summary if summary.get("update") == update else None
 
@@ -89,7 +97,7 @@ def judge(summary: dict[str, Any], updates: int) -> None:
     """Say what is wrong with a recorded model.
 
     Args:
-        summary: from `record` or `recorded`.
+        summary: from `record` or `read_record`.
         updates: that the whole training has.
 
     Raises:

@@ -8,7 +8,7 @@ from cluster.tracking import Run
 from cluster.tracking.recorder import PAUSE_SECONDS, Recorder
 
 CONSEQUENCE = ". Training goes on; its curves are completed when the store is back"
-"""What a person reads when the store fails meanwhile."""
+"""A person reads this behind the store's error when the store fails meanwhile."""
 
 
 class Reports:

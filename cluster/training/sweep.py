@@ -35,7 +35,7 @@ CHANGES: Final[Mapping[str, Mapping[str, Any]]] = {
     "stride-10": {"stride": 10},
     "bound-alone": {"weighting": "paper"},
 }
-"""One change at a time: what matters most, a step to each side."""
+"""One change is made at a time: of what matters most, a step to each side."""
 
 
 def sweep(
@@ -52,6 +52,19 @@ def sweep(
     """Train a model for each change and rank them by a cheap proxy of what they are worth for BO.
 
     What is finished is kept: the same command goes on with the rest.
+
+    Args:
+        folder: of the dataset.
+        model: folder, in which each model has its own.
+        preset: of model and training.
+        seed: of weights, order and draws.
+        settings: of the trainings, before a change.
+        session: where they run.
+        tracker: that records them.
+        changes: other values of settings, by the name of the model.
+
+    Returns:
+        Path of the table, best model first.
 
     Raises:
         UserError: the dataset, an existing folder or the cluster does not fit, another command trains into

@@ -59,11 +59,24 @@ def train(
     session: Session,
     tracker: Tracker,
 ) -> Path:
-    """Train a model on a dataset, or go on where an interrupted training stopped; returns the checkpoint.
+    """Train a model on a dataset, or go on where an interrupted training stopped.
+
+    Args:
+        folder: of the dataset.
+        model: folder of the model.
+        preset: of model and training.
+        seed: of weights, order and draws.
+        settings: of the training.
+        session: where it runs.
+        tracker: that records it.
+
+    Returns:
+        Path of the checkpoint.
 
     Raises:
         UserError: the dataset, an existing checkpoint, the disk or the cluster does not fit, another command
             trains into the folder, or a full-size training collapsed.
+        UsageError: there is no such preset, or the model's folder is a file.
     """
     with _refusals(model):
         dataset = trainable(folder)
@@ -146,7 +159,18 @@ def working_in(model: Path) -> Iterator[None]:
 
 
 def plan_job(dataset: Dataset, model: Path, preset: str, seed: int, settings: TrainSettings) -> TrainingJob:
-    """What the training processes get."""
+    """Gather what the training processes get.
+
+    Args:
+        dataset: to train on.
+        model: folder of the model.
+        preset: of model and training.
+        seed: of weights, order and draws.
+        settings: of the training.
+
+    Returns:
+        The job, with absolute paths.
+    """
     stride = settings.stride_or(usual_stride(preset))
     return TrainingJob(
         dataset=dataset.folder.resolve(),
@@ -184,7 +208,14 @@ def _check(job: TrainingJob, dataset: Dataset) -> _Plan:
 
 
 def updates_so_far(job: TrainingJob, training: TrainingSettings) -> int:
-    """Updates behind the checkpoint from which a job goes on; 0 without one.
+    """Count the updates behind the checkpoint from which a job goes on.
+
+    Args:
+        job: what the training processes get.
+        training: settings that the checkpoint must have.
+
+    Returns:
+        Updates of both stages; 0 without a checkpoint.
 
     Raises:
         UserError: it was made with other settings.

@@ -127,7 +127,15 @@ def run_worker(config: dict[str, Any]) -> None:
 
 
 def train_together(job: TrainingJob, mailbox: Any) -> SvaeDc:
-    """This worker's copy of the model that all workers train together; rank 0 saves it and reports."""
+    """Train one model together with all other workers; rank 0 saves it and reports.
+
+    Args:
+        job: what is trained, from which data.
+        mailbox: handle of a `Mailbox`, for reports.
+
+    Returns:
+        This worker's copy of the model.
+    """
     device = get_device()
     context = _context(job, device)
     return _train(
@@ -175,7 +183,15 @@ def _train(
 
 
 def updates_in(state: dict[str, Any], settings: TrainingSettings) -> int:
-    """Updates behind a saved state, over both stages."""
+    """Count the updates behind a saved state.
+
+    Args:
+        state: as `saved_state` returns it.
+        settings: of the training.
+
+    Returns:
+        Updates of both stages.
+    """
     before = settings.joint.updates if state["stage"] == "prior" else 0
     stage = settings.prior if state["stage"] == "prior" else settings.joint
     is_over = state["is_over"]
