@@ -1,5 +1,6 @@
 """Files that appear whole: written beside their place, then moved there."""
 
+import errno
 import fcntl
 import json
 import os
@@ -10,6 +11,14 @@ from typing import Any
 
 from cluster.errors import UserError
 from workers.dataset.storage.atomic import synchronise
+
+DISK_ERRORS = frozenset(
+    {
+        *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
+        *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
+    }
+)
+"""An `OSError` of these is the disk's fault: no further attempt changes it."""
 
 
 @contextmanager

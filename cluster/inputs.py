@@ -90,7 +90,8 @@ def setup_of(name: str, bad: str = "") -> "Setup":
     """
     from workers.setups.registry import load
 
-    sys.path.append(str(Path.cwd()))
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
     with usage_errors():
         found = load(name)
         if not bad:
@@ -130,4 +131,4 @@ def usage_errors() -> Iterator[None]:
     try:
         yield
     except (LookupError, ValueError) as error:
-        raise UsageError(error.args[0]) from error
+        raise UsageError(str(error.args[0]) if error.args else type(error).__name__) from error

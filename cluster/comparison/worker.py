@@ -1,6 +1,5 @@
 """What one worker of a comparison does: hidden physics, shared first trials, a method, trial after trial."""
 
-import errno
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from ray import tune
 
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
+from cluster.files import DISK_ERRORS
 from cluster.models import shared_model
 from cluster.optimization import Optimization, hidden_robot
 from svaedc.bo import methods
@@ -24,7 +24,6 @@ from workers.setups import Setup
 
 STEP_SECONDS = 1.0
 """A worker reports after so long: a user sees that as live, and any robot makes some trials in it."""
-_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,7 @@ class RunTrainable(tune.Trainable):
         try:
             made = list(self._next())
         except OSError as error:
-            if error.errno not in _DISK:
+            if error.errno not in DISK_ERRORS:
                 raise
             return {"disk": str(error), "done": True}
         if not made:  # the record was whole before this attempt

@@ -1,6 +1,5 @@
 """The work of a collection: submit shards to a pool of actors, gather what they report, clean up."""
 
-import errno
 import sys
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -14,6 +13,7 @@ from cluster.datasets.progress import CollectionProgress, ProgressRecorder
 from cluster.datasets.quarantine import put_aside
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
+from cluster.files import DISK_ERRORS
 from cluster.progress import ProgressLine, say
 from cluster.runtime.actor_pool import Done, Failed, Limits, Pool
 from cluster.tracking import Run
@@ -22,11 +22,6 @@ from workers.dataset.folder import Dataset
 from workers.dataset.inventory import sweep_digests
 from workers.dataset.shards import Shard, sweep
 from workers.dataset.storage.temporary import wait_for_end
-
-_DISK = {
-    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES),
-    *(errno.EIO, errno.ESTALE, errno.ENOTCONN),  # a network's file system that is away
-}
 
 _ENDING_SECONDS = 10.0
 """A worker process may take so long to end once it was told to."""
@@ -143,7 +138,7 @@ def note_failure(failure: Failed[Shard], dataset: Dataset, counts: CollectionPro
     Raises:
         UserError: it is the disk's fault, which no further attempt changes.
     """
-    if isinstance(failure.cause, OSError) and failure.cause.errno in _DISK:
+    if isinstance(failure.cause, OSError) and failure.cause.errno in DISK_ERRORS:
         raise _unwritable(dataset, failure.cause)
     counts.errors[failure.item].append(failure.text)
     if failure.attempts_left:

@@ -129,8 +129,7 @@ def reconstruction(path: Path, model: SvaeDc, held_out: Episodes, identity: Iden
         rows[row][0].set_ylabel(f"{name} ({unit})")
     rows[0][0].legend(frameon=False, fontsize=8)
     figure.supxlabel("time (s)")
-    figure.savefig(path, dpi=130)
-    return path
+    return _save(figure, path)
 
 
 def _moving_channels(held_out: Episodes, identity: Identity) -> list[int]:
