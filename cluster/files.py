@@ -41,9 +41,6 @@ def replacing(path: Path) -> Iterator[Path]:
 def alone_in(folder: Path, refusal: str) -> Iterator[None]:
     """Keeps other commands of this machine out of an existing folder for as long as the block lasts.
 
-    The kernel holds the lock for this process's descriptor of the folder, which no other program that it
-    starts inherits: it ends with the process, however that ends, and leaves no file behind.
-
     Args:
         folder: that is locked; what is below it is not.
         refusal: what another command is told meanwhile, with the remedy.
@@ -54,12 +51,31 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
     Raises:
         UserError: another command works in the folder.
     """
+    try:
+        with _locked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            yield
+    except BlockingIOError as error:
+        raise UserError(refusal) from error
+
+
+@contextmanager
+def turn_in(folder: Path) -> Iterator[None]:
+    """Lets commands of this machine into a folder one after the other; it is created first."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with _locked(folder, fcntl.LOCK_EX):
+        yield
+
+
+@contextmanager
+def _locked(folder: Path, operation: int) -> Iterator[None]:
+    """Holds the kernel's lock on a folder itself: `filelock` would leave a file of its own in it.
+
+    The lock is held by this process's descriptor of the folder, which no other program that it starts inherits:
+    it ends with the process, however that ends.
+    """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UserError(refusal) from error
+        fcntl.flock(descriptor, operation)
         yield
     finally:
         os.close(descriptor)

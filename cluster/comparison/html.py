@@ -3,22 +3,18 @@
 import math
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from svaedc.analysis.statistics import Estimate
 from svaedc.analysis.summary import Difference, MethodSummary, Summary
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem }
-h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px }
-th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap }
-th:first-child, td:first-child { text-align: left } img { max-width: 100% }
-.scroll { overflow-x: auto } .note { background: #fff3cd; padding: .5rem .8rem } details { margin: .4rem 0 }
-"""
+TEMPLATE = "report.html.j2"
+"""The page's words and looks; what is computed for it is below."""
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+_TUNING = "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
 
 
 def page(
@@ -37,22 +33,19 @@ def page(
         The page as HTML.
     """
     after = checkpoints(summary, initial)
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        _about(summary, initial),
-        *(_image(path) for path in figures),
-        "<h2>Methods</h2>",
-        _table(_method_header(after, initial), _method_rows(summary, after)),
-        "<h2>Paired differences on shared seeds</h2>",
-        "<p>Method minus baseline: mean, 90 % bootstrap interval, and p of a two-sided sign-flip test after "
-        "Holm's correction for the number of baselines of that method at that trial.</p>",
-        *_differences(summary, after, initial),
-        "<h2>Settings and fingerprints</h2>",
-        _table(("setting", "value"), ((name, str(value)) for name, value in settings.items())),
-    ]
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    loader = PackageLoader("cluster.comparison", ".")
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    return environment.get_template(TEMPLATE).render(
+        title=title,
+        notes=[*([_TUNING] if summary.purpose != "reporting" else []), *_remarks(summary)],
+        trials=summary.trials,
+        initial=initial,
+        figures=[_image(path) for path in figures],
+        methods={"header": _method_header(after, initial), "rows": list(_method_rows(summary, after))},
+        differences={"header": _difference_header(after, initial), "rows": _differences(summary, after)},
+        settings=list(settings.items()),
     )
 
 
@@ -71,17 +64,6 @@ def checkpoints(summary: Summary, initial: int) -> list[int]:
     return sorted(index for index in wanted if index < summary.trials)
 
 
-def _about(summary: Summary, initial: int) -> str:
-    tuning = "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
-    notes = [tuning] if summary.purpose != "reporting" else []
-    return (
-        "".join(f'<p class="note">{note}</p>' for note in (*notes, *_remarks(summary)))
-        + f"<p>Every run has {summary.trials} trials: {initial} random ones, shared by all methods of a "
-        "seed together with the hidden physics, then those the method suggested. Intervals are 90 %, "
-        "over complete runs.</p>"
-    )
-
-
 def _remarks(summary: Summary) -> Iterable[str]:
     """What a reader would otherwise wonder about."""
     ran = [method for method in summary.methods.values() if method.runs]
@@ -94,9 +76,9 @@ def _remarks(summary: Summary) -> Iterable[str]:
         )
 
 
-def _image(path: Path) -> str:
+def _image(path: Path) -> dict[str, str]:
     data = b64encode(path.read_bytes()).decode()
-    return f'<p><img alt="{escape(path.stem)}" src="data:{_MEDIA_TYPES[path.suffix]};base64,{data}"></p>'
+    return {"name": path.stem, "type": _MEDIA_TYPES[path.suffix], "data": data}
 
 
 def _method_header(after: Sequence[int], initial: int) -> list[str]:
@@ -128,15 +110,20 @@ def _until_success(method: MethodSummary) -> str:
     return f"{median} ({found.reached} of {method.runs} runs)"
 
 
-def _differences(summary: Summary, after: Sequence[int], initial: int) -> Iterable[str]:
+def _difference_header(after: Sequence[int], initial: int) -> list[str]:
     header = ["baseline", "runs"]
     for index in after:
         header += [f"best after {index + 1 - initial} suggested", "p"]
-    for name in summary.methods:
-        rows = [_difference(each, after) for each in summary.differences if each.method == name]
-        if rows:
-            table = _table([*header, "mean objective", "p"], rows)
-            yield f"<details><summary>{escape(name)} against every other</summary>{table}</details>"
+    return [*header, "mean objective", "p"]
+
+
+def _differences(summary: Summary, after: Sequence[int]) -> list[tuple[str, list[list[str]]]]:
+    """The rows of each method that was compared with another."""
+    tables = (
+        (name, [_difference(each, after) for each in summary.differences if each.method == name])
+        for name in summary.methods
+    )
+    return [(name, rows) for name, rows in tables if rows]
 
 
 def _difference(each: Difference, after: Sequence[int]) -> list[str]:
@@ -144,12 +131,6 @@ def _difference(each: Difference, after: Sequence[int]) -> list[str]:
     for index in after:
         cells += [_estimate(each.best[index]), _p(each.p_best[index])]
     return [*cells, _estimate(each.objective), _p(each.p_objective)]
-
-
-def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>\n" for row in rows)
-    return f'<div class="scroll"><table><tr>{head}</tr>\n{body}</table></div>'
 
 
 def _estimate(value: Estimate) -> str:

@@ -46,6 +46,8 @@ class Process:
 class FolderLock:
     """Held from construction to `close` or the death of the process, whichever is first.
 
+    Not `filelock`'s: the locked file says who holds it, and whoever asks that must not get in the way.
+
     Args:
         folder: of the campaign; on a local disk.
         patience: seconds to wait for another process to let go.

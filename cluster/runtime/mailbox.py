@@ -5,39 +5,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import ray
 from ray.exceptions import RayError
+from ray.util.queue import Queue
 
 _POLL_SECONDS = 0.5
 _FAREWELL_SECONDS = 5.0
 """An interrupted block waits so long for what `receive` is doing."""
 
 
-class Mailbox:
-    """Holds messages until the driver takes them."""
-
-    def __init__(self) -> None:
-        self._messages: list[Any] = []
-
-    def put(self, message: Any) -> None:
-        """Add a message."""
-        self._messages.append(message)
-
-    def take(self) -> list[Any]:
-        """All messages since the last call."""
-        messages, self._messages = self._messages, []
-        return messages
-
-
 @contextmanager
-def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
+def mailbox(receive: Callable[[Any], None]) -> Iterator[Queue]:
     """A mailbox whose messages are handed to `receive`, on a thread of the driver, until the block ends.
 
     An error in `receive` keeps no later message from it; the first is raised at the end of the block. A block
     that ends by Ctrl-C or an exit does not wait for a `receive` that takes long, nor for what it left over.
     """
-    actor: Any = ray.remote(Mailbox)
-    box = actor.options(num_cpus=0).remote()
+    box = Queue(actor_options={"num_cpus": 0})
     ended = threading.Event()
     errors: list[Exception] = []
 
@@ -58,14 +41,14 @@ def mailbox(receive: Callable[[Any], None]) -> Iterator[Any]:
         thread.join(patience)
         if not thread.is_alive():
             _take(box, receive, errors)
-        ray.kill(box)
+        box.shutdown(force=True)
     if errors:
         raise errors[0]
 
 
-def _take(box: Any, receive: Callable[[Any], None], errors: list[Exception]) -> None:
+def _take(box: Queue, receive: Callable[[Any], None], errors: list[Exception]) -> None:
     try:
-        messages = ray.get(box.take.remote())
+        messages = box.get_nowait_batch(box.qsize())
     except RayError as error:
         errors.append(error)
         return

@@ -1,11 +1,7 @@
 """The store behind the runs: a SQLite file, created safely, or an MLflow server."""
 
-import fcntl
 import logging
-import os
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import SplitResult, urlsplit
 
@@ -16,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
-from cluster.files import replacing
+from cluster.files import replacing, turn_in
 from cluster.tracking.runs import Tracker, unusable
 
 SQLITE = "sqlite:///"
@@ -43,7 +39,7 @@ def open_tracker(settings: TrackingSettings) -> Tracker:
             return Tracker(client, uri, _experiment(client, settings.experiment, artifacts=None))
         database = Path(uri.removeprefix(SQLITE)).expanduser().absolute()
         uri = f"{SQLITE}{database}"
-        with _alone(database):
+        with turn_in(database.parent):
             artifacts = (database.parent / "mlruns").as_uri()
             if not database.exists():
                 _create(database, settings.experiment, artifacts)
@@ -75,18 +71,6 @@ def _experiment(client: MlflowClient, name: str, artifacts: str | None) -> str:
             f"the MLflow experiment {name!r} was deleted; restore it or --set tracking.experiment=NAME"
         )
     return str(found.experiment_id)
-
-
-@contextmanager
-def _alone(database: Path) -> Iterator[None]:
-    """Holds a lock on the database's folder, creating it first; the kernel frees it when the process dies."""
-    database.parent.mkdir(parents=True, exist_ok=True)
-    folder = os.open(database.parent, os.O_RDONLY)
-    try:
-        fcntl.flock(folder, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(folder)
 
 
 def _knock(address: SplitResult) -> None:

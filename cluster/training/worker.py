@@ -139,7 +139,11 @@ def train_together(job: TrainingJob, mailbox: Any) -> SvaeDc:
     device = get_device()
     context = _context(job, device)
     return _train(
-        job, context, device, mailbox.put.remote, lambda update: ray.train.report({"update": update})
+        job,
+        context,
+        device,
+        mailbox.actor.put_nowait.remote,
+        lambda update: ray.train.report({"update": update}),
     )
 
 
