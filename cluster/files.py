@@ -5,7 +5,7 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -51,11 +51,12 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
     Raises:
         UserError: another command works in the folder.
     """
-    try:
-        with _locked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB):
-            yield
-    except BlockingIOError as error:
-        raise UserError(refusal) from error
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(_locked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB))
+        except BlockingIOError as error:
+            raise UserError(refusal) from error
+        yield
 
 
 @contextmanager
@@ -70,8 +71,8 @@ def turn_in(folder: Path) -> Iterator[None]:
 def _locked(folder: Path, operation: int) -> Iterator[None]:
     """Holds the kernel's lock on a folder itself: `filelock` would leave a file of its own in it.
 
-    The lock is held by this process's descriptor of the folder, which no other program that it starts inherits:
-    it ends with the process, however that ends.
+    The lock is that of this process, which no program that it starts inherits: it ends
+    with the process, however that ends.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
