@@ -120,9 +120,7 @@ def _show(now: "Status") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(
-        "trial", "state", "kind", "f", "y", title=f"{now.name}: {now.standing}", title_justify="left"
-    )
+    table = Table("trial", "state", "kind", "f", "y", title=f"{now.name}: {now.phase}", title_justify="left")
     for trial in now.trials:
         f, y = ("" if value is None else f"{value:+.3f}" for value in (trial.f, trial.y))
         table.add_row(str(trial.number), str(trial.state), trial.kind, f, y)

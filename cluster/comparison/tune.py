@@ -45,13 +45,13 @@ class Watch(Callback):
 
     Attributes:
         progress: counts trials.
-        standing: shown beside it.
+        best: shown beside it.
         ended: called with every run that is over, whole or not.
         disk: why the disk takes no more; "" while it does.
     """
 
     progress: ProgressLine
-    standing: BestSoFar
+    best: BestSoFar
     ended: Callable[[RunKey], None]
     disk: str = ""
 
@@ -74,8 +74,8 @@ class Watch(Callback):
         """
         self.disk = self.disk or result.get("disk", "")
         if "trials" in result:
-            self.standing.best[RunKey(**trial.config["run"])] = result["best"]
-            self.progress.advance(result["trials"], f"best so far: {self.standing}")
+            self.best.best[RunKey(**trial.config["run"])] = result["best"]
+            self.progress.advance(result["trials"], f"best so far: {self.best}")
 
     def on_trial_complete(self, iteration: int, trials: Any, trial: Any, **_: Any) -> None:  # noqa: ARG002
         """A run ended.

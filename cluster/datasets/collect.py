@@ -1,4 +1,4 @@
-"""`svaedc collect`: collect what is missing in a dataset and record it, or foretell what that will cost."""
+"""`svaedc collect`: collect what a dataset misses and record it, or say from a few shards what that costs."""
 
 from cluster.config import CollectSettings
 from cluster.datasets.gather import growth, roll_out, rollout_pool

@@ -68,10 +68,10 @@ def advance(campaign: Campaign) -> Phase:
     running here is then one that nobody carries out any more.
     """
     recover(campaign)
-    now = _standing(campaign)
+    now = _phase(campaign)
     while now is Phase.READY:
         trial = _step(campaign)
-        now = _standing(campaign)
+        now = _phase(campaign)
         if trial.state in TERMINAL:
             break
     return now
@@ -163,7 +163,7 @@ def record(
     return journal.trial(trial.number)
 
 
-def _standing(campaign: Campaign) -> Phase:
+def _phase(campaign: Campaign) -> Phase:
     return phase_of(campaign.journal.trials(), campaign.journal.identity)
 
 

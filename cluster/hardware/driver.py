@@ -64,10 +64,10 @@ def _carry_out(actor: Any, plan: CampaignPlan, first: Status, run: Run, report: 
     _record(run, first, 0)
     report(first)
     before = first
-    while before.standing is not Phase.COMPLETE:
-        if before.standing is Phase.AWAITS_RESOLUTION:
+    while before.phase is not Phase.COMPLETE:
+        if before.phase is Phase.AWAITS_RESOLUTION:
             raise UserError(before.advice)
-        if before.standing is Phase.AWAITS_APPROVAL:
+        if before.phase is Phase.AWAITS_APPROVAL:
             time.sleep(POLL_SECONDS)
         now = _answer(actor.advance.remote(plan), say)
         if now != before:

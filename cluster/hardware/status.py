@@ -13,6 +13,8 @@ from cluster.hardware.states import TERMINAL, Approval, State
 RANDOM_TRIALS = 2
 """So many random trials are measured before the first suggestion, as in the paper's hardware runs."""
 
+REASONS = {State.FAILED: "fault", State.REJECTED: "reason"}
+
 
 class Phase(StrEnum):
     """What a campaign needs next."""
@@ -56,9 +58,6 @@ def measured_trials(trials: tuple[CampaignTrial, ...]) -> int:
     return sum(trial.state is State.MEASURED for trial in trials)
 
 
-REASONS = {State.FAILED: "fault", State.REJECTED: "reason"}
-
-
 @dataclass(frozen=True)
 class Status:
     """One look at a campaign.
@@ -66,14 +65,14 @@ class Status:
     Attributes:
         name: of the campaign.
         identity: of the campaign.
-        standing: what it needs next.
+        phase: what it needs next.
         trials: by number.
         advice: a sentence for the person in charge; "" when nothing is asked of them.
     """
 
     name: str
     identity: CampaignIdentity
-    standing: Phase
+    phase: Phase
     trials: tuple[CampaignTrial, ...]
     advice: str
 

@@ -145,10 +145,10 @@ def carry_out(
         with closing(FusedJournal(folder / journal.FILE, now)) as fused:
             fused.fuse = fuse
             robot = DeskRobot(folder, fuse, pace, faulty)
-            standing = Phase.READY
-            while standing is Phase.READY:
-                standing = campaign.advance(campaign_on(fused, robot))
-    return standing, fuse.names
+            phase = Phase.READY
+            while phase is Phase.READY:
+                phase = campaign.advance(campaign_on(fused, robot))
+    return phase, fuse.names
 
 
 def starts(folder: Path) -> list[str]:

@@ -89,7 +89,7 @@ def test_nothing_ray_does_can_start_a_trial_twice():
 def test_a_campaign_runs_to_its_end_and_every_trial_is_tracked(ray_session, tracker, settings, tmp_path):
     reports = []
     last = start(settings, ray_session, tracker, plan_in(tmp_path), reports.append, print)
-    assert last.standing is Phase.COMPLETE
+    assert last.phase is Phase.COMPLETE
     assert [report.measured for report in reports] == [0, 1, 2, 3]
     [run] = tracker.client.search_runs([tracker.experiment], f"tags.`svaedc.campaign` = '{last.name}'")
     best = tracker.client.get_metric_history(run.info.run_id, "best")
@@ -136,8 +136,8 @@ def test_a_waiting_campaign_goes_on_when_a_person_approves(ray_session, tracker,
     plan = plan_in(tmp_path, trials=0, approval=Approval.OPERATOR)
     reports = []
     last = start(settings, ray_session, tracker, plan, reports.append, print)
-    assert last.standing is Phase.COMPLETE
-    assert Phase.AWAITS_APPROVAL in {report.standing for report in reports}
+    assert last.phase is Phase.COMPLETE
+    assert Phase.AWAITS_APPROVAL in {report.phase for report in reports}
     for approver in approvers:
         approver.join()
 
@@ -156,7 +156,7 @@ def test_a_folder_of_another_campaign_is_refused_and_the_robot_is_free_afterward
     with pytest.raises(UserError, match="holds a campaign with trials '0', asked for '1'"):
         start(settings, ray_session, tracker, plan_in(tmp_path, trials=1), lambda _: None, print)
     last = start(settings, ray_session, tracker, plan_in(tmp_path / "other"), lambda _: None, print)
-    assert last.standing is Phase.COMPLETE
+    assert last.phase is Phase.COMPLETE
 
 
 @pytest.fixture
@@ -215,7 +215,7 @@ def test_a_command_interrupted_while_it_waits_leaves_nothing_behind(
     assert gone("franka-rehearsal", settings.namespace)
     ray.kill(neighbour)
     last = start(settings, joined, tracker, plan_in(tmp_path), lambda _: None, print)
-    assert last.standing is Phase.COMPLETE
+    assert last.phase is Phase.COMPLETE
     assert gone("franka-rehearsal", settings.namespace)
 
 
@@ -287,5 +287,5 @@ def test_a_killed_local_driver_leaves_an_unknown_trial_and_then_goes_on(tmp_path
     assert len(starts(folder)) == 1
     operator.resolve(folder, 0, "measured", "Ada", "seen", 0.25, 0.5)
     assert driving(tmp_path, "", "lab", 0.0).wait(timeout=180) == 0
-    assert operator.status(folder).standing is Phase.COMPLETE
+    assert operator.status(folder).phase is Phase.COMPLETE
     assert len(set(starts(folder))) == len(starts(folder)) == 3

@@ -30,11 +30,11 @@ def die(processes, folder, point):
 
 def test_a_trial_left_running_is_explained_and_resolved_as_measured(processes, tmp_path):
     die(processes, tmp_path, IN_MOTION)
-    assert operator.status(tmp_path).standing is Phase.RUNNING
+    assert operator.status(tmp_path).phase is Phase.RUNNING
     assert "left behind by a dead process" in operator.status(tmp_path).advice
     carry_out(tmp_path)
     seen = operator.status(tmp_path)
-    assert seen.standing is Phase.AWAITS_RESOLUTION
+    assert seen.phase is Phase.AWAITS_RESOLUTION
     assert "its ledger: started, never ended" in seen.advice
     assert f"svaedc hardware resolve {tmp_path} --trial 0" in seen.advice
     trial = operator.resolve(tmp_path, 0, "measured", "Ada", "read it off the tape", 0.5, 0.1)
@@ -114,7 +114,7 @@ def test_a_waiting_trial_is_named_with_the_command_that_approves_it(tmp_path):
     identity = replace(IDENTITY, approval=Approval.OPERATOR)
     carry_out(tmp_path, identity=identity)
     seen = operator.status(tmp_path)
-    assert seen.standing is Phase.AWAITS_APPROVAL
+    assert seen.phase is Phase.AWAITS_APPROVAL
     assert f"svaedc hardware approve {tmp_path} --trial 0 --who NAME" in seen.advice
     assert operator.approve(tmp_path, 0, "Ada").state is State.APPROVED
     with pytest.raises(IllegalTransition, match="from approved to approved"):
@@ -130,7 +130,7 @@ def test_nobody_is_not_a_person(tmp_path):
 def test_status_counts_and_finds_the_best(tmp_path):
     carry_out(tmp_path)
     seen = operator.status(tmp_path)
-    assert (seen.measured, seen.planned, seen.standing, seen.advice) == (4, 4, Phase.COMPLETE, "")
+    assert (seen.measured, seen.planned, seen.phase, seen.advice) == (4, 4, Phase.COMPLETE, "")
     assert seen.best == max(trial.f for trial in seen.trials)
 
 

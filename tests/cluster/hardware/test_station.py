@@ -35,7 +35,7 @@ def carried_out(plan):
     executor = Executor(plan)
     try:
         seen = executor.status()
-        while seen.standing is Phase.READY:
+        while seen.phase is Phase.READY:
             seen = executor.advance()
     finally:
         executor.close()
@@ -89,7 +89,7 @@ def test_a_plan_means_the_same_folder_in_every_working_directory(monkeypatch, tm
 @pytest.mark.parametrize("method", ["random", "se", "svae-dc"])
 def test_a_rehearsal_campaign_runs_to_its_end(tmp_path, model, method):
     seen = carried_out(plan_in(tmp_path / method, method, 2, model if methods.needs_model(method) else None))
-    assert seen.standing is Phase.COMPLETE
+    assert seen.phase is Phase.COMPLETE
     assert [trial.kind for trial in seen.trials] == ["random", "random", "suggested", "suggested"]
     starts = MotionLedger(tmp_path / method / "starts.jsonl").entries()
     assert [entry["event"] for entry in starts] == ["started", "ended"] * 4
@@ -100,7 +100,7 @@ def test_an_interrupted_campaign_proposes_bit_for_bit_what_an_undisturbed_one_do
     used = model if methods.needs_model(method) else None
     whole = carried_out(plan_in(tmp_path / "whole", method, 2, used))
     seen = None
-    while seen is None or seen.standing is Phase.READY:
+    while seen is None or seen.phase is Phase.READY:
         executor = Executor(plan_in(tmp_path / "pieces", method, 2, used))
         seen = executor.advance()
         executor.close()
@@ -125,7 +125,7 @@ def test_another_campaign_in_the_folder_is_refused_naming_the_field(tmp_path):
     carried_out(plan_in(tmp_path, trials=0))
     with pytest.raises(IdentityMismatch, match="holds a campaign with trials '0', asked for '1'"):
         Executor(plan_in(tmp_path, trials=1))
-    assert carried_out(plan_in(tmp_path, trials=0)).standing is Phase.COMPLETE
+    assert carried_out(plan_in(tmp_path, trials=0)).phase is Phase.COMPLETE
 
 
 def test_a_second_executor_is_refused_while_the_first_holds_the_folder(tmp_path, monkeypatch):
@@ -135,7 +135,7 @@ def test_a_second_executor_is_refused_while_the_first_holds_the_folder(tmp_path,
         Executor(plan_in(tmp_path))
     first.close()
     second = Executor(plan_in(tmp_path))
-    assert second.status().standing is Phase.READY
+    assert second.status().phase is Phase.READY
     second.close()
 
 
