@@ -16,8 +16,8 @@ from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
-from svaedc.bo.methods import Method
 from svaedc.bo.online import Adjustable
+from svaedc.bo.strategies import Method
 from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.presets import Sizes, compact
 

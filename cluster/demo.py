@@ -8,8 +8,8 @@ from pathlib import Path
 from cluster.comparison.compare import Comparison
 from cluster.config import Settings
 from cluster.progress import say
-from cluster.reproduction.experiment import NINE, Panel, Recipe
 from cluster.reproduction.plan import Reproduction, Scale
+from cluster.reproduction.recipe import NINE, Panel, Recipe
 from cluster.reproduction.run import preflight, run_steps
 from cluster.runtime.session import Session
 from cluster.tracking import Tracker

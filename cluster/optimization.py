@@ -13,8 +13,8 @@ from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents
 from svaedc.bo.loop import Outcome
-from svaedc.bo.methods import Method
 from svaedc.bo.online import Adjustable
+from svaedc.bo.strategies import Method
 from svaedc.model.svae_dc import SvaeDc
 from workers.environments.environment import Environment
 from workers.randomness import Stream, generator

@@ -64,7 +64,7 @@ def reproduce(
     Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
     `svaedc reproduce figure-7 --runs 50`
     """
-    from cluster.reproduction import figures
+    from cluster.reproduction import paper_figures
     from cluster.reproduction import plan as scales
     from cluster.reproduction.plan import resolve
     from cluster.reproduction.run import reproduce as run_reproduction
@@ -72,7 +72,7 @@ def reproduce(
     settings = settings_of(config, overrides)
     _require_consistent(settings, dataset, episodes)
     with usage_errors():
-        recipe, size = figures.recipe(figure), scales.scale(scale)
+        recipe, size = paper_figures.recipe(figure), scales.scale(scale)
     reproduction = resolve(
         recipe,
         size,

@@ -2,7 +2,7 @@
 
 import math
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from svaedc.analysis.statistics import Estimate
 from svaedc.analysis.summary import Difference, MethodSummary, Summary
 
 TEMPLATE = "report.html.j2"
-"""The page's words and looks; what is computed for it is below."""
+"""The page: its words, its tables and their columns. What is computed for it is below."""
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 _TUNING = "These runs have tuning seeds: they are for choosing settings, and their numbers are no results."
 
@@ -32,19 +32,27 @@ def page(
     Returns:
         The page as HTML.
     """
-    after = checkpoints(summary, initial)
-    loader = PackageLoader("cluster.comparison", ".")
     environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
+        loader=PackageLoader("cluster.comparison", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
     )
+    environment.filters |= {
+        "estimate": _estimate,
+        "share": _share,
+        "until_success": _until_success,
+        "p_value": _p_value,
+    }
     return environment.get_template(TEMPLATE).render(
         title=title,
         notes=[*([_TUNING] if summary.purpose != "reporting" else []), *_remarks(summary)],
         trials=summary.trials,
         initial=initial,
         figures=[_image(path) for path in figures],
-        methods={"header": _method_header(after, initial), "rows": list(_method_rows(summary, after))},
-        differences={"header": _difference_header(after, initial), "rows": _differences(summary, after)},
+        after=checkpoints(summary, initial),
+        methods=sorted(summary.methods.items(), key=_best_first),
+        differences=list(_differences_by_method(summary)),
         settings=list(settings.items()),
     )
 
@@ -81,27 +89,9 @@ def _image(path: Path) -> dict[str, str]:
     return {"name": path.stem, "type": _MEDIA_TYPES[path.suffix], "data": data}
 
 
-def _method_header(after: Sequence[int], initial: int) -> list[str]:
-    return [
-        *("method", "runs", "incomplete"),
-        *(f"best after {index + 1 - initial} suggested" for index in after),
-        *("mean objective", "runs with success", "trials to success, median", "broken", "no objective"),
-    ]
-
-
-def _method_rows(summary: Summary, after: Sequence[int]) -> Iterable[list[str]]:
-    def order(name: str) -> float:
-        best = summary.methods[name].best[-1].mean
-        return math.inf if math.isnan(best) else -best
-
-    for name in sorted(summary.methods, key=order):
-        method = summary.methods[name]
-        yield [
-            *(name, str(method.runs), str(method.incomplete)),
-            *(_estimate(method.best[index]) for index in after),
-            *(_estimate(method.objective), _share(method.successful_runs), _until_success(method)),
-            *(_share(method.broken_trials), _share(method.failed_trials)),
-        ]
+def _best_first(named: tuple[str, MethodSummary]) -> float:
+    best = named[1].best[-1].mean
+    return math.inf if math.isnan(best) else -best
 
 
 def _until_success(method: MethodSummary) -> str:
@@ -110,27 +100,12 @@ def _until_success(method: MethodSummary) -> str:
     return f"{median} ({found.reached} of {method.runs} runs)"
 
 
-def _difference_header(after: Sequence[int], initial: int) -> list[str]:
-    header = ["baseline", "runs"]
-    for index in after:
-        header += [f"best after {index + 1 - initial} suggested", "p"]
-    return [*header, "mean objective", "p"]
-
-
-def _differences(summary: Summary, after: Sequence[int]) -> list[tuple[str, list[list[str]]]]:
-    """The rows of each method that was compared with another."""
-    tables = (
-        (name, [_difference(each, after) for each in summary.differences if each.method == name])
-        for name in summary.methods
-    )
-    return [(name, rows) for name, rows in tables if rows]
-
-
-def _difference(each: Difference, after: Sequence[int]) -> list[str]:
-    cells = [each.baseline, str(each.runs)]
-    for index in after:
-        cells += [_estimate(each.best[index]), _p(each.p_best[index])]
-    return [*cells, _estimate(each.objective), _p(each.p_objective)]
+def _differences_by_method(summary: Summary) -> Iterator[tuple[str, list[Difference]]]:
+    """The differences of each method that was compared with another."""
+    for name in summary.methods:
+        found = [each for each in summary.differences if each.method == name]
+        if found:
+            yield name, found
 
 
 def _estimate(value: Estimate) -> str:
@@ -144,5 +119,5 @@ def _share(value: Estimate) -> str:
     return "–" if math.isnan(value.mean) else f"{value.mean:.0%}"
 
 
-def _p(value: float) -> str:
+def _p_value(value: float) -> str:
     return "–" if math.isnan(value) else ("< 0.001" if value < 0.001 else f"{value:.3f}")

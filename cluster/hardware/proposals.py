@@ -16,7 +16,7 @@ from cluster.optimization import Optimization
 from svaedc.bo import methods
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
-from svaedc.bo.methods import Method
+from svaedc.bo.strategies import Method
 from svaedc.model.svae_dc import SvaeDc
 from workers.setups import Setup
 

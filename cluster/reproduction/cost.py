@@ -16,8 +16,8 @@ from typing import Final
 from cluster.comparison.records import RunKey, read_trials
 from cluster.config import Settings
 from cluster.progress import duration
-from cluster.reproduction.experiment import Panel
 from cluster.reproduction.plan import Reproduction
+from cluster.reproduction.recipe import Panel
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 
 from cluster.comparison.folder import FIGURE, PAGE
 from cluster.files import write_json, write_text, writing
-from cluster.reproduction.experiment import Recipe
 from cluster.reproduction.plan import Reproduction
+from cluster.reproduction.recipe import Recipe
 from svaedc.analysis.evidence import Claim, Finding
 from svaedc.analysis.summary import Summary
 

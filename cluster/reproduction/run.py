@@ -11,8 +11,8 @@ from cluster.datasets.collect import collect
 from cluster.datasets.plan import plan_collection
 from cluster.progress import say, timing
 from cluster.reproduction.cost import bill, lines
-from cluster.reproduction.experiment import Panel
 from cluster.reproduction.plan import Reproduction
+from cluster.reproduction.recipe import Panel
 from cluster.reproduction.report import Table, publish, table
 from cluster.runtime.placement import free_machines
 from cluster.runtime.session import Session

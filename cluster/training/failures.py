@@ -14,6 +14,8 @@ from torch.distributed import DistError
 
 from cluster.runtime.ray_internals import health_check_failure, is_train_error
 
+DEATHS = 3
+"""One command survives so many deaths of training processes, each from the last checkpoint."""
 _TRANSPORTS = ("gloo", "nccl")
 """Torch names one of these in the plain RuntimeErrors which say that another process no longer answers."""
 

@@ -19,12 +19,10 @@ from cluster.progress import ProgressLine, say
 from cluster.runtime.mailbox import mailbox
 from cluster.runtime.placement import FreeNode, Placement, place
 from cluster.tracking import Run
-from cluster.training.failures import explanation, is_death
+from cluster.training.failures import DEATHS, explanation, is_death
 from cluster.training.reports import Reports
 from cluster.training.worker import TrainingJob, run_worker
 
-DEATHS = 3
-"""One command survives so many deaths of training processes, each from the last checkpoint."""
 _STARTS = 2
 """Ray Train tries so many starts of the processes anew; each waits a minute for its room."""
 

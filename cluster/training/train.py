@@ -23,7 +23,7 @@ from svaedc.training.presets import usual_stride
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
 from workers.dataset.storage.location import Location
-from workers.dataset.storage.s3 import StoreError
+from workers.dataset.storage.s3_connection import StoreError
 
 MINIMUM_EPISODES = 200
 """Fewer cannot be split into something to learn from and something to measure on."""

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from svaedc.bo.history import History
-from svaedc.bo.methods import Method
+from svaedc.bo.strategies import Method
 
 Status = Literal["ok", "failed"]
 

@@ -3,145 +3,50 @@
 import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, Protocol, runtime_checkable
+from functools import partial
+from typing import Final
 
-import numpy as np
-import torch
-from jaxtyping import Float32
-from torch import Tensor
-
+from svaedc.bo import gp, kernels, surrogates
 from svaedc.bo.acquisition import (
     Acquisition,
     ByGradient,
     OverPool,
     Search,
-    Value,
     log_ei,
-    torch_randomness,
     ucb,
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
-from svaedc.bo.gp import GaussianProcess, Posterior
-from svaedc.bo.history import History
-from svaedc.bo.surrogates import LATENT_SURROGATES, LEAST_BAD, SURROGATES, Surrogate
-from svaedc.bo.trust_region import TrustRegion
+from svaedc.bo.strategies import (
+    BayesianOptimization,
+    Method,
+    PoolSearch,
+    TrustRegionOptimization,
+    UniformSearch,
+)
+from svaedc.bo.surrogates import LEAST_BAD, Surrogate
 
+SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
+    "se": partial(surrogates.on_controllers, kernels.se),
+    "matern": partial(surrogates.on_controllers, kernels.matern),
+    "botorch": partial(surrogates.packaged_gp, gp.default),
+    "saasbo": partial(surrogates.packaged_gp, gp.saas),
+    "turbo": partial(surrogates.packaged_gp, gp.turbo),
+}
+"""These methods learn from the controllers as they are; a new competitor is one line here or below."""
 
-@runtime_checkable
-class Method(Protocol):
-    """A way to choose the next controller."""
-
-    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """Choose the next controller: a pure function of the construction and these arguments.
-
-        Args:
-            history: Trials of the run so far.
-            rng: Generator of the trial.
-
-        Returns:
-            Controller, [D], in the unit cube.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class UniformSearch:
-    """Random search in the unit cube."""
-
-    dimensions: int
-
-    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:  # noqa: ARG002
-        """Draw uniformly.
-
-        Args:
-            history: Not used.
-            rng: Generator of the trial.
-
-        Returns:
-            Controller, [D], in the unit cube.
-        """
-        return rng.random(self.dimensions).astype(np.float32)
-
-
-@dataclass(frozen=True)
-class PoolSearch:
-    """Random search among candidates."""
-
-    candidates: Candidates
-
-    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """Draw uniformly from the candidates no trial was spent on.
-
-        Args:
-            history: Trials of the run so far.
-            rng: Generator of the trial.
-
-        Returns:
-            Candidate, [D].
-        """
-        return OverPool().anywhere(self.candidates, history, rng)
-
-
-@dataclass(frozen=True)
-class BayesianOptimization:
-    """Bayesian optimisation.
-
-    Attributes:
-        surrogate: What the trials teach about all controllers.
-        acquisition: What makes a controller promising.
-        search: Where the most promising one is sought.
-    """
-
-    surrogate: Surrogate
-    acquisition: Acquisition
-    search: Search
-
-    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """Choose the controller of largest acquisition; before the first measurement, any.
-
-        Args:
-            history: Trials of the run so far.
-            rng: Generator of the trial.
-
-        Returns:
-            Controller, [D], in the unit cube.
-        """
-        candidates = self.surrogate.candidates
-        if not len(history):
-            return self.search.anywhere(candidates, history, rng)
-        with torch_randomness(rng):
-            posterior, best = self.surrogate.after(history)
-        return self.search.maximize(_value(posterior, self.acquisition, best), candidates, history, rng)
-
-
-@dataclass(frozen=True)
-class TrustRegionOptimization:
-    """TuRBO-1: Bayesian optimisation in a box around the best controller, which follows from the history."""
-
-    surrogate: Surrogate
-    acquisition: Acquisition
-    search: Search
-
-    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
-        """Choose the controller of largest acquisition in the box; where a box begins, any.
-
-        Args:
-            history: Trials of the run so far.
-            rng: Generator of the trial.
-
-        Returns:
-            Controller, [D], in the unit cube.
-        """
-        region = TrustRegion.after(history.f.tolist(), history.x.shape[1])
-        if region.begins:
-            return self.search.anywhere(self.surrogate.candidates, history, rng)
-        recent = History(history.x[region.first :], history.f[region.first :], history.failed)
-        with torch_randomness(rng):
-            posterior, best = self.surrogate.after(recent)
-        center = torch.tensor(recent.x[recent.f.argmax()])
-        box = self.surrogate.candidates.within(*region.box(center, _lengthscales(posterior)))
-        return self.search.maximize(_value(posterior, self.acquisition, best), box, history, rng)
-
+LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
+    "svae": partial(surrogates.on_paths, kernels.se),
+    "svae-matern": partial(surrogates.on_paths, kernels.matern),
+    "svae-dc": partial(surrogates.on_compressed_paths, kernels.se),
+    "svae-dc-matern": partial(surrogates.on_compressed_paths, kernels.matern),
+    "svae-dc-sigmoid": partial(surrogates.on_sigmoid_paths, kernels.se),
+    "svae-dc-whitened": partial(surrogates.on_whitened_paths, kernels.se),
+    "svae-dc-online": partial(surrogates.on_adjusted_paths, kernels.se),
+    "screened-svae": partial(surrogates.on_screened_paths, kernels.se),
+    "bbk-kl": surrogates.on_trajectories,
+    "lkl": surrogates.on_latent_distributions,
+}
+"""These methods need a trained model."""
 
 _SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
 _ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
@@ -260,20 +165,6 @@ def _optimization(name: _Name, problem: Problem) -> Method:
     kind = TrustRegionOptimization if name.base == "turbo" else BayesianOptimization
     surrogate = (SURROGATES | LATENT_SURROGATES)[name.base](problem)
     return kind(surrogate, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])
-
-
-def _value(posterior: Posterior, acquisition: Acquisition, best: float) -> Value:
-    def value(phi: Tensor) -> Tensor:
-        return acquisition(*posterior.moments(phi), best)
-
-    return value
-
-
-def _lengthscales(posterior: Posterior) -> Tensor:
-    if not isinstance(posterior, GaussianProcess):
-        raise TypeError(f"a trust region needs a GaussianProcess, got {type(posterior).__name__}")
-    lengthscale: Tensor = posterior.model.covar_module.base_kernel.lengthscale
-    return lengthscale.flatten()
 
 
 def _without_suffix(name: str, suffixes: Mapping[str, object]) -> tuple[str, str]:

@@ -9,7 +9,7 @@ import torch
 from gpytorch.kernels import Kernel
 from torch import Tensor
 
-from svaedc.bo import gp, kernels
+from svaedc.bo import kernels
 from svaedc.bo.candidates import Candidates, Problem, as_they_are, by_density, by_latents, in_the_cube
 from svaedc.bo.distribution_features import Density
 from svaedc.bo.features import Sigmoid, Whitened, svae, svae_dc
@@ -188,25 +188,3 @@ def _on_density(density: Density, problem: Problem) -> Surrogate:
 
 def _kernel_surrogate(candidates: Candidates, kernel: Callable[[], Kernel], problem: Problem) -> Surrogate:
     return Surrogate(candidates, partial(fit, kernel), problem.objective_limits)
-
-
-SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
-    "se": partial(on_controllers, kernels.se),
-    "matern": partial(on_controllers, kernels.matern),
-    "botorch": partial(packaged_gp, gp.default),
-    "saasbo": partial(packaged_gp, gp.saas),
-    "turbo": partial(packaged_gp, gp.turbo),
-}
-
-LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
-    "svae": partial(on_paths, kernels.se),
-    "svae-matern": partial(on_paths, kernels.matern),
-    "svae-dc": partial(on_compressed_paths, kernels.se),
-    "svae-dc-matern": partial(on_compressed_paths, kernels.matern),
-    "svae-dc-sigmoid": partial(on_sigmoid_paths, kernels.se),
-    "svae-dc-whitened": partial(on_whitened_paths, kernels.se),
-    "svae-dc-online": partial(on_adjusted_paths, kernels.se),
-    "screened-svae": partial(on_screened_paths, kernels.se),
-    "bbk-kl": on_trajectories,
-    "lkl": on_latent_distributions,
-}

@@ -3,9 +3,9 @@
 import pytest
 
 from cluster.reproduction.cost import comparing, training
-from cluster.reproduction.experiment import Panel, Recipe
-from cluster.reproduction.figures import RECIPES, recipe
+from cluster.reproduction.paper_figures import RECIPES, recipe
 from cluster.reproduction.plan import SCALES, scale
+from cluster.reproduction.recipe import Panel, Recipe
 from svaedc.analysis.evidence import Claim, MedianGap
 from svaedc.analysis.paired_evidence import Gain
 from svaedc.bo import methods

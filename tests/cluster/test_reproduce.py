@@ -13,9 +13,9 @@ from cluster.comparison.records import RunKey, append
 from cluster.config import CompareSettings, Settings, TrainSettings
 from cluster.errors import UserError
 from cluster.reproduction.cost import bill, lines
-from cluster.reproduction.experiment import Panel, Recipe
-from cluster.reproduction.figures import RECIPES
+from cluster.reproduction.paper_figures import RECIPES
 from cluster.reproduction.plan import SCALES, resolve
+from cluster.reproduction.recipe import Panel, Recipe
 from cluster.reproduction.report import publish, table
 from cluster.reproduction.run import reproduce
 from cluster.runtime.session import Session

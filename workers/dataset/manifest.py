@@ -6,7 +6,7 @@ import json
 from workers.dataset.identity import Identity
 from workers.dataset.storage.atomic import link, synchronise, temporary_file
 from workers.dataset.storage.location import Location
-from workers.dataset.storage.s3_path import ObjectPath
+from workers.dataset.storage.s3 import ObjectPath
 from workers.dataset.storage.temporary import WRITING, is_dead, writer
 
 MANIFEST = "dataset.json"

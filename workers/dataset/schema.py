@@ -16,7 +16,7 @@ from workers.dataset.identity import Identity
 from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_in, require_own
 from workers.dataset.quantisation import decode, describe_encoding, encode
 from workers.dataset.storage.location import Location, source
-from workers.dataset.storage.s3 import refusal
+from workers.dataset.storage.s3_connection import refusal
 from workers.rollout import Episode
 
 ROW_GROUP = 64  # episodes

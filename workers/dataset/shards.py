@@ -9,7 +9,7 @@ from pathlib import Path
 
 from workers.dataset.storage.atomic import link, move, synchronise, temporary_file
 from workers.dataset.storage.location import Location, fetch
-from workers.dataset.storage.s3 import StoreError
+from workers.dataset.storage.s3_connection import StoreError
 from workers.dataset.storage.temporary import WRITING, is_dead
 
 _NAME = re.compile(r"episodes-(\d{9})-(\d{9})\.parquet")

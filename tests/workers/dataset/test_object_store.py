@@ -27,7 +27,7 @@ from workers.dataset.replacement import replace as put_right
 from workers.dataset.shards import Shard
 from workers.dataset.statistics import statistics
 from workers.dataset.storage.location import Location, location
-from workers.dataset.storage.s3 import StoreError, reaching
+from workers.dataset.storage.s3_connection import StoreError, reaching
 from workers.dataset.storage.temporary import WRITING, writer
 from workers.dataset.verification import verify
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from workers.dataset.storage.s3_path import ObjectPath, object_path
+from workers.dataset.storage.s3 import ObjectPath, object_path
 
 Location = Path | ObjectPath
 """Both know `/`, `name`, `exists`, `iterdir`, `glob`, `read_bytes`, `read_text`, `unlink` and the like."""

@@ -1,125 +1,222 @@
-"""A connection to an object store, and what its refusals mean."""
+"""A path in an object store: what `pathlib.Path` is on a disk, as far as a dataset needs it."""
 
-import errno
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatch
 from typing import Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
-CONNECT_SECONDS = 5.0
-REQUEST_SECONDS = 20.0
-ATTEMPTS = 3
-"""A store that is away is given up after that many attempts, each of at most so long."""
+from workers.dataset.storage.s3_connection import (
+    OPTIONS,
+    Options,
+    connection,
+    is_found,
+    reaching,
+    require_bucket,
+)
+from workers.dataset.storage.temporary import WRITING, writer
 
-OPTIONS = ("endpoint_override", "region", "scheme")
-"""These names, which are PyArrow's, may stand behind the `?` of an address."""
-
-Options = tuple[tuple[str, str], ...]
-
-_GONE = re.compile(r"AWS Error (NO_SUCH_KEY|RESOURCE_NOT_FOUND during (Get|Head)Object)")
-"""An answer without a body, as to an object that is removed while it is sent, does not name the key."""
-_REFUSED = "ACCESS_DENIED|INVALID_ACCESS_KEY|SIGNATURE|TOKEN|AUTHENTICATION|CREDENTIAL|CLIENT|status 403"
+ONE_REQUEST = 10 << 20
+"""PyArrow sends so many bytes at once."""
 
 
-class StoreError(OSError):
-    """An object store that does not do what was asked; its text says why, and what to do."""
+@dataclass(frozen=True)
+class Stat:
+    """What is known of an object.
+
+    Attributes:
+        st_size: its bytes.
+    """
+
+    st_size: int
+
+
+@dataclass(frozen=True)
+class ObjectPath:
+    """An object, or the common beginning of the names of several, with the methods of `pathlib.Path`.
+
+    Nothing is asked of the store before a method needs it, so a path travels to other processes.
+
+    Attributes:
+        bucket: its name.
+        key: without slashes at either end; "" for the whole bucket.
+        options: of the connection, by the names in `OPTIONS`; what is not given is the environment's.
+        known: what a listing said of the object already.
+        content: its bytes, when they have been fetched already.
+    """
+
+    bucket: str
+    key: str
+    options: Options = ()
+    known: Stat | None = field(default=None, compare=False, repr=False)
+    content: bytes | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return str(self.strerror)
+        return f"s3://{self._place}" + (f"?{urlencode(self.options, safe=':/')}" if self.options else "")
+
+    def __truediv__(self, name: str) -> "ObjectPath":
+        return ObjectPath(self.bucket, f"{self.key}/{name}".lstrip("/"), self.options)
+
+    @property
+    def name(self) -> str:
+        """The last part of the key."""
+        return self.key.rpartition("/")[2]
+
+    @property
+    def parent(self) -> "ObjectPath":
+        """What all names before the last slash of the key have in common."""
+        return ObjectPath(self.bucket, self.key.rpartition("/")[0], self.options)
+
+    def at(self, options: Mapping[str, str]) -> "ObjectPath":
+        """The same path at a store for which these options hold unless the address has its own endpoint.
+
+        A region is taken over even then, for an endpoint does not tell it.
+        """
+        own = dict(self.options)
+        kept = options if "endpoint_override" not in own else {"region": options.get("region", "")}
+        merged = {name: value for name, value in {**kept, **own}.items() if value}
+        return replace(self, options=tuple(sorted(merged.items())))
+
+    def resolve(self) -> "ObjectPath":
+        """The path itself: an address is the same everywhere."""
+        return self
+
+    def is_absolute(self) -> bool:
+        """True: an address is the same everywhere."""
+        return True
+
+    def as_uri(self) -> str:
+        """The address."""
+        return str(self)
+
+    def mkdir(self, *, parents: bool = False, exist_ok: bool = False) -> None:
+        """Do nothing, for a store has no folders.
+
+        Args:
+            parents: as of `pathlib.Path`.
+            exist_ok: as of `pathlib.Path`.
+        """
+
+    def exists(self) -> bool:
+        """Whether there is such an object, or one below; a bucket that is missing is refused."""
+        with reaching(self):
+            is_there = is_found(self._store.get_file_info(self._place))
+        if not is_there:
+            require_bucket(self.bucket, self.options)
+        return is_there
+
+    def stat(self) -> Stat:
+        """Its size, without a request if a listing said it already."""
+        if self.known is not None:
+            return self.known
+        with reaching(self), self._store.open_input_file(self._place) as file:
+            return Stat(file.size())
+
+    def iterdir(self) -> Iterator["ObjectPath"]:
+        """The objects directly below, none if there are none."""
+        from pyarrow import fs
+
+        with reaching(self):
+            listed = self._store.get_file_info(fs.FileSelector(self._place, allow_not_found=True))
+        for info in listed:
+            if info.type == fs.FileType.File:
+                yield replace(self / info.base_name, known=Stat(info.size))
+
+    def glob(self, pattern: str) -> Iterator["ObjectPath"]:
+        """Those of them whose name fits a pattern without slashes."""
+        return (path for path in self.iterdir() if fnmatch(path.name, pattern))
+
+    def open(self, mode: str = "rb") -> Any:
+        """A file of PyArrow's to read from; errors of reading are for `refusal` to explain."""
+        import pyarrow
+
+        if mode != "rb":
+            raise ValueError(f"an object is read as 'rb' and written whole by write_bytes, got mode {mode!r}")
+        if self.content is not None:
+            return pyarrow.BufferReader(self.content)
+        with reaching(self):
+            return self._store.open_input_file(self._place)
+
+    def fetch(self) -> "ObjectPath":
+        """The same path with its bytes, which are asked for once."""
+        return self if self.content is not None else replace(self, content=self.read_bytes())
+
+    def read_bytes(self) -> bytes:
+        """All its bytes; a missing object raises `FileNotFoundError`."""
+        with reaching(self), self._store.open_input_stream(self._place) as stream:
+            return bytes(stream.read())
+
+    def read_text(self, errors: str = "strict") -> str:
+        """Its bytes as UTF-8."""
+        return self.read_bytes().decode(errors=errors)
+
+    def write_bytes(self, content: bytes) -> None:
+        """Put the object there at once, in the place of what was there.
+
+        What does not fit in one request goes in parts, which PyArrow joins even if some of them were refused:
+        so it goes to a name of its writer's first, and one request copies it from there.
+        """
+        if len(content) <= ONE_REQUEST:
+            self._upload(content)
+            return
+        aside = self.parent / WRITING / f"{self.name}.{writer()}"
+        try:
+            aside._upload(content)
+            with reaching(self):
+                self._store.copy_file(aside._place, self._place)
+        finally:
+            aside.unlink(missing_ok=True)
+
+    def _upload(self, content: bytes) -> None:
+        with reaching(self):
+            stream = self._store.open_output_stream(self._place)
+            try:
+                stream.write(content)
+                stream.close()
+            finally:
+                del stream  # one that failed ends here by joining its parts, before whoever called goes on
+
+    def write_text(self, text: str) -> None:
+        """The same for text, as UTF-8."""
+        self.write_bytes(text.encode())
+
+    def unlink(self, *, missing_ok: bool = False) -> None:
+        """Remove the object."""
+        try:
+            with reaching(self):
+                self._store.delete_file(self._place)
+        except FileNotFoundError:
+            if not missing_ok:
+                raise
+
+    @property
+    def _place(self) -> str:
+        return f"{self.bucket}/{self.key}".rstrip("/")
+
+    @property
+    def _store(self) -> Any:
+        return connection(self.options)
 
 
-@contextmanager
-def reaching(path: object) -> Iterator[None]:
-    """Turns what PyArrow says of a store into a sentence with a remedy; other errors pass.
+def object_path(address: str) -> ObjectPath:
+    """The path that an address such as `s3://bucket/prefix?region=eu-west-1` names.
 
     Raises:
-        StoreError: the store cannot be reached, or refuses.
-        FileNotFoundError: an object was removed between two requests of one reading.
+        ValueError: it is no such address, or holds what does not belong there.
     """
-    try:
-        yield
-    except OSError as error:
-        if _GONE.search(str(error)):
-            raise FileNotFoundError(errno.ENOENT, "no such object", str(path)) from error
-        refused = refusal(path, error)
-        if refused is None:
-            raise
-        raise refused from error
-
-
-def refusal(path: object, error: Exception) -> StoreError | None:
-    """Explain what an error says about the store.
-
-    Args:
-        path: that was asked for, for the text.
-        error: as PyArrow raised it.
-
-    Returns:
-        The error to raise instead; None if it is about something else.
-    """
-    if isinstance(error, StoreError):
-        return StoreError(error.errno, error.strerror)
-    is_of_store = "AWS Error" in str(error) and not _GONE.search(str(error))
-    return StoreError(*_explain(path, str(error))) if is_of_store else None
-
-
-def _explain(path: object, reason: str) -> tuple[int, str]:
-    """What is wrong, and its number: EACCES for what no further attempt changes."""
-    brief = re.sub(r"\s*\(Request ID.*", "", reason.partition("AWS Error ")[2])
-    if "NO_SUCH_BUCKET" in reason:
-        return errno.EACCES, f"there is no bucket for {path}: create it, or name one that exists"
-    if re.search(_REFUSED, reason):
-        return errno.EACCES, (
-            f"the object store refuses access to {path} ({brief}): set AWS_ACCESS_KEY_ID and "
-            "AWS_SECRET_ACCESS_KEY, or AWS_PROFILE, to an account that may list, read, write and delete there"
-        )
-    if "NETWORK_CONNECTION" in reason:
-        return errno.EHOSTUNREACH, (
-            f"the object store of {path} does not answer ({brief}): check the network, and AWS_ENDPOINT_URL "
-            "or ?endpoint_override=HOST:PORT&scheme=http if it is not Amazon's"
-        )
-    return errno.EREMOTEIO, (
-        f"the object store of {path} failed ({brief}): check its region (AWS_REGION or ?region=NAME), and "
-        "try again"
-    )
-
-
-def is_found(info: Any) -> bool:
-    """Whether PyArrow's answer to a question for a path says that there is something."""
-    from pyarrow import fs
-
-    return info.type != fs.FileType.NotFound
-
-
-@cache
-def require_bucket(bucket: str, options: Options) -> None:
-    """Make sure, once in a process, that a bucket exists.
-
-    Args:
-        bucket: its name.
-        options: of the connection, by the names in `OPTIONS`.
-
-    Raises:
-        StoreError: it does not, or the store cannot be reached, or refuses.
-    """
-    name = f"s3://{bucket}"
-    with reaching(name):
-        is_there = is_found(connection(options).get_file_info(bucket))
-    if not is_there:
-        raise StoreError(*_explain(name, "NO_SUCH_BUCKET"))
-
-
-@cache
-def connection(options: Options) -> Any:
-    """PyArrow's file system for a store, one in a process; PyArrow is loaded when the first is needed."""
-    from pyarrow import fs
-
-    return fs.S3FileSystem(
-        **dict(options),
-        connect_timeout=CONNECT_SECONDS,
-        request_timeout=REQUEST_SECONDS,
-        retry_strategy=fs.AwsStandardS3RetryStrategy(max_attempts=ATTEMPTS),
-        allow_delayed_open=True,  # one request for a small object
-        background_writes=False,
-    )
+    parts = urlsplit(address)
+    form = f"an object store is addressed as s3://bucket/prefix, got {address!r}"
+    if parts.scheme != "s3" or not parts.netloc or parts.fragment:
+        raise ValueError(form)
+    if "@" in parts.netloc:
+        raise ValueError("an address holds no credentials; AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY do")
+    key = parts.path.strip("/")
+    if key and not {"", ".", ".."}.isdisjoint(key.split("/")):
+        raise ValueError(f"{form}, whose prefix has empty or dotted parts")
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    unknown = sorted(options.keys() - {*OPTIONS})
+    if unknown or not all(options.values()):
+        raise ValueError(f"{form}; after the ? may stand {', '.join(OPTIONS)}, each with a value")
+    if options.get("scheme", "https") not in ("http", "https"):
+        raise ValueError(f"scheme must be http or https, got {options['scheme']!r}")
+    return ObjectPath(parts.netloc, key, tuple(sorted(options.items())))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from cluster.reproduction.experiment import THIRTY, Panel, Recipe
+from cluster.reproduction.recipe import THIRTY, Panel, Recipe
 from svaedc.analysis.evidence import Claim, MedianGap, Steadier, Successes
 from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
 
