@@ -7,7 +7,6 @@ import typer
 
 from cluster.cli.options import SetupName, TrainedModel
 from cluster.inputs import durable, setup_of
-from cluster.progress import say
 
 X_HELP = "random:SEED, dataset:FOLDER:INDEX, an .npy file, or D numbers in [0, 1] separated by commas."
 SEED_HELP = "Draws the physics as data collection does. Without it: the dataset episode's own, or nominal."
@@ -44,27 +43,7 @@ def render(
     An episode beside what a trained model reconstructs of it, and generates from its controller alone:
     `svaedc render --setup franka --x dataset:data/franka:12 --model models/franka --out told.gif`
     """
-    from cluster.files import replacing
-    from cluster.rendering.episodes import episode_to_draw
-    from cluster.rendering.frames import clip, drawable, pictures, summary, usual_speed
-    from cluster.rendering.frames import stills as chosen_stills
-    from cluster.rendering.model_frames import beside
-    from cluster.rendering.video import STILLS, write
+    from cluster.rendering.render import Drawing
+    from cluster.rendering.render import render as render_episode
 
-    robot = setup_of(setup)
-    size = drawable(robot, out, width, height)
-    pace = usual_speed(robot) if speed is None else speed
-    episode = episode_to_draw(x, robot, seed)
-    if out.suffix in STILLS:
-        moments, note = chosen_stills(robot, episode, stills), robot.name
-    else:
-        moments, note = clip(robot, episode, pace, fps), f"{robot.name} {pace:.2g}x"
-    if model is None:
-        drawn = pictures(robot, episode, moments, size, note)
-    else:
-        drawn = beside(robot, episode, model, moments, size, out.suffix)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(out) as unfinished:
-        write(unfinished, out.suffix, drawn, fps)
-    say(summary(robot, episode))
-    say(f"wrote {out}: {len(moments)} pictures, {out.stat().st_size / 1e3:.0f} kB")
+    render_episode(setup_of(setup), x, seed, Drawing(out, width, height, speed, fps, stills), model)

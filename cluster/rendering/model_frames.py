@@ -19,7 +19,7 @@ from svaedc.model.reconstruction import Reconstruction, reconstructions, remarka
 from svaedc.model.svae_dc import SvaeDc
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset
-from workers.rendering import Size, frames, scenery_of
+from workers.pictures import Size, frames, scenery_of
 from workers.rollout import Episode, degrees, stride_steps
 from workers.setups import Setup
 

@@ -42,7 +42,7 @@ def parts(strip):
 def test_a_model_that_repeats_the_trajectory_is_drawn_like_it(setup, episode, stride):
     from cluster.rendering.frames import Moment
     from cluster.rendering.model_frames import strips
-    from workers.rendering import Size
+    from workers.pictures import Size
 
     moments = [Moment(step, ()) for step in (4, 249, 499)]
     drawn = [parts(strip) for strip in strips(setup, shown(episode, stride), moments, Size(*SIDE))]

@@ -9,7 +9,7 @@ import pybullet
 import pytest
 
 from workers import setups
-from workers.rendering import Show, Size, frames, pose_of, scenery_of
+from workers.pictures import Show, Size, frames, pose_of, scenery_of
 from workers.rollout import random_episode
 from workers.simulation.stage import Scene
 

@@ -154,3 +154,31 @@ def test_a_new_campaign_draws_what_a_comparison_of_its_seed_draws(tmp_path):
     np.testing.assert_array_equal(first.x.astype(np.float32), shared.initial(0))
     old = replace(shared, draws=1)
     assert not np.array_equal(old.initial(0), shared.initial(0))
+
+
+TOLD = """
+from workers import setups
+from workers.controllers.controller import Command, Controller, unit_cube
+from workers.controllers.reference import euler_angles
+from workers.dataset.cache import training_cache
+from workers.dataset.folder import open_dataset
+from workers.environments.environment import Channel, Environment, Observed
+from workers.gymnasium_environment import SetupEnvironment
+from workers.hardware import ledger
+from workers.hardware.driver import Measurement, Motion, RobotFault
+from workers.hardware.ledger import MotionLedger
+from workers.physics import Physics, PhysicsRanges, around
+from workers.pictures import Size, frames
+from workers.rollout import random_episode
+from workers.setups import Setup, load
+from workers.simulation.bullet import pybullet
+from workers.simulation.cylinder import Cylinder
+from workers.simulation.description import joint_indices, load_robot
+from workers.simulation.world import World
+from workers.tasks.own_bad import conditions
+from workers.tasks.task import Task
+"""
+
+
+def test_what_the_documentation_told_people_to_import_can_be_imported():
+    exec(TOLD, {})
