@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from cluster.errors import UsageError, UserError
-from workers.setups.registry import SETUPS
+from workers.setups.names import SETUPS
 
 if TYPE_CHECKING:
     from workers.dataset.storage.location import Location

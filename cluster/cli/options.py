@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cluster.inputs import durable, durable_dataset
-from workers.setups.registry import SETUPS
+from workers.setups.names import SETUPS
 
 if TYPE_CHECKING:
     from cluster.config import Part, Settings

@@ -5,7 +5,8 @@ What a setup is made of is imported when it is first asked for: names alone cost
 
 from typing import TYPE_CHECKING, Any
 
-from workers.setups.registry import SETUPS, file_digest, import_user_module, load, require_known
+from workers.setups.names import SETUPS, require_known
+from workers.setups.registry import file_digest, import_user_module, load
 
 if TYPE_CHECKING:
     from workers.setups.setup import Setup

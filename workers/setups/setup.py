@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges, ranges
-from workers.setups.registry import require_known
+from workers.setups.names import require_known
 from workers.tasks.stop import STOPPED, StopRule, never
 from workers.tasks.task import BITS, Task
 
