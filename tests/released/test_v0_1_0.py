@@ -19,6 +19,7 @@ from cluster.comparison.worker import ComparisonJob
 from cluster.hardware.executor import Executor
 from cluster.hardware.plan import CampaignPlan, identify
 from cluster.hardware.states import Approval, State
+from svaedc.bo.history import History
 from svaedc.data.episodes import Episodes, split
 from svaedc.model import checkpoint
 from svaedc.training.config import StageSettings, TrainingSettings, Weighting
@@ -147,11 +148,13 @@ def test_a_new_campaign_draws_what_a_comparison_of_its_seed_draws(tmp_path):
         identify("franka-rehearsal", "se", 1, 5, 40, None, Approval.POLICY), tmp_path / "new", None, 0.0
     )
     executor = Executor(plan)
-    first = executor.advance().trials[0]
+    first, second, third = [executor.advance() for _ in range(3)][-1].trials
     executor.close()
     job = ComparisonJob(ComparisonFolder(tmp_path), "franka", "paper", "", pool_size=40, initial=2, trials=1)
     shared = job.optimization(RunKey("se", 5), setups.load("franka"))
     np.testing.assert_array_equal(first.x.astype(np.float32), shared.initial(0))
+    history = History.empty(48).append(shared.initial(0), first.f).append(shared.initial(1), second.f)
+    np.testing.assert_array_equal(third.x.astype(np.float32), shared.build().suggest(history, shared.rng(2)))
     old = replace(shared, draws=1)
     assert not np.array_equal(old.initial(0), shared.initial(0))
 

@@ -154,7 +154,7 @@ def test_a_failed_trial_is_told_with_its_reason_after_another_was_amended(tmp_pa
 def test_the_export_is_the_campaign_and_every_event(tmp_path):
     carry_out(tmp_path)
     first, *events = [json.loads(line) for line in operator.export(tmp_path)]
-    assert first == {"campaign": "desk-1", **asdict(IDENTITY)}
+    assert first == {"campaign": "desk-1", **IDENTITY.facts()}
     with closing(opened(tmp_path)) as book:
         assert events == [asdict(event) for event in book.events()]
 
