@@ -12,9 +12,9 @@ from cluster.errors import UserError
 from cluster.hardware import journal
 from cluster.hardware.database import JournalCorrupt, JournalError
 from cluster.hardware.events import replay
-from cluster.hardware.identity import CampaignIdentity
+from cluster.hardware.identity import CampaignIdentity, IdentityMismatch
 from cluster.hardware.journal import IllegalTransition, Journal, KeyReused, RobotTaken
-from cluster.hardware.states import LEGAL, Approval, IdentityMismatch, State
+from cluster.hardware.states import LEGAL, Approval, State
 from tests.cluster.hardware.desk import IDENTITY, carry_out, now
 
 X = np.array([0.1, 1.0 / 3.0, 5e-324])

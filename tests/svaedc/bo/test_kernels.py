@@ -5,7 +5,7 @@ import torch
 
 from svaedc.bo import distribution_features, kernels
 from svaedc.bo.features import svae_dc
-from tests.svaedc.fake_latents import latent_means
+from tests.svaedc.bo.fake_latents import latent_means
 
 KERNELS = [kernels.se, kernels.matern]
 

@@ -16,7 +16,7 @@ from cluster.errors import UserError
 from cluster.tracking import open_tracker
 from cluster.tracking.server import serve_ui
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")

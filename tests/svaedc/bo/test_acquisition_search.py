@@ -6,7 +6,7 @@ from svaedc.bo.acquisition import ByGradient, OverPool, torch_randomness
 from svaedc.bo.candidates import as_they_are, by_latents
 from svaedc.bo.features import svae_dc
 from svaedc.bo.history import History
-from tests.svaedc.fake_latents import problem
+from tests.svaedc.bo.fake_latents import problem
 
 NOTHING = History.empty(2)
 

@@ -7,7 +7,7 @@ from svaedc.bo import gp, kernels, methods
 from svaedc.bo.features import Sigmoid
 from svaedc.bo.history import History
 from svaedc.bo.online import LAST_LAYERS, Adjustable, AdjustedPaths
-from tests.svaedc.fake_latents import FakeModel, latent_means, problem
+from tests.svaedc.bo.fake_latents import FakeModel, latent_means, problem
 
 FAKE = Adjustable(FakeModel(), layers=("last.weight",))
 

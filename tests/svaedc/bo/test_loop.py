@@ -6,7 +6,7 @@ import pytest
 
 from svaedc.bo import methods
 from svaedc.bo.loop import Outcome, trials
-from tests.svaedc.fake_latents import problem, quadratic
+from tests.svaedc.bo.fake_latents import problem, quadratic
 
 INITIAL = np.array([[0.5, 0.5], [0.9, 0.1]], dtype=np.float32)
 

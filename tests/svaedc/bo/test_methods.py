@@ -8,7 +8,7 @@ from svaedc.bo import methods
 from svaedc.bo.candidates import Problem, as_they_are, by_latents
 from svaedc.bo.features import Latents, svae_dc
 from svaedc.bo.history import History
-from tests.svaedc.fake_latents import latent_means, problem, quadratic
+from tests.svaedc.bo.fake_latents import latent_means, problem, quadratic
 
 
 def best_of_run(name, seed, count=12):

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from svaedc.bo.features import Latents, Sigmoid, Whitened, svae, svae_dc
-from tests.svaedc.fake_latents import latent_means
+from tests.svaedc.bo.fake_latents import latent_means
 
 
 def latents(count=50, dimensions=4):

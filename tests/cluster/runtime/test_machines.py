@@ -17,7 +17,7 @@ from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.storage.temporary import WRITING
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 SLOW = '''
 """quadratic-30d, but an episode takes a tenth of a second."""
 

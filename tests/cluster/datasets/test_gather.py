@@ -82,7 +82,7 @@ def collected(folder) -> subprocess.CompletedProcess[str]:
     settings = {"tracking.uri": "sqlite:///mlflow.db", "ray.num_cpus": 2, "collect.episodes_per_shard": 4}
     settings |= {"collect.shard_timeout_seconds": LIMIT, "collect.attempts_per_shard": 2}
     command += [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
     return subprocess.run(
         command, capture_output=True, text=True, check=False, cwd=folder, env=environment, timeout=580
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cluster.test_cli import svaedc
+from tests.cluster.cli.test_main import svaedc
 
 WIDTH, HEIGHT = 64, 48
 
