@@ -9,17 +9,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-import torch
 
-from svaedc.model import checkpoint
-
-
-def weights(path: Path) -> dict[str, torch.Tensor]:
-    return checkpoint.load(path)[0].state_dict()
-
-
-def same(first: dict[str, torch.Tensor], second: dict[str, torch.Tensor]) -> bool:
-    return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
+from tests.cluster.training.small import same, weights
 
 
 def command(dataset: Path, model: Path, root: Path) -> list[str]:
