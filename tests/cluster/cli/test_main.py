@@ -1,28 +1,14 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
-import os
-import re
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-
-def svaedc(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    environment = {name: value for name, value in os.environ.items() if name != "RAY_ADDRESS"}
-    return subprocess.run(
-        [str(Path(sys.executable).parent / "svaedc"), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env=environment,
-    )
-
+from tests.cluster.cli.command_line import svaedc
 
 COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
+
 COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
 
 
@@ -89,29 +75,6 @@ def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, me
     assert "Traceback" not in result.stderr
 
 
-def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_dataset, tmp_path):
-    info = svaedc("dataset", "info", str(small_dataset), folder=tmp_path)
-    assert info.returncode == 0, info.stderr
-    assert "16 in 2 shards" in info.stdout
-    assert "object_tipped" in info.stdout
-    assert re.search(r"diverged +0\b", info.stdout)
-    assert re.search(r"stopped +0\b", info.stdout)
-    assert svaedc("dataset", "verify", str(small_dataset), folder=tmp_path).returncode == 0
-    broken = tmp_path / "broken"
-    broken.mkdir()
-    for path in small_dataset.iterdir():
-        if path.is_file():
-            (broken / path.name).write_bytes(path.read_bytes())
-    victim = min(broken.glob("*.parquet"))
-    content = bytearray(victim.read_bytes())
-    content[5000] ^= 1
-    victim.write_bytes(content)
-    result = svaedc("dataset", "verify", str(broken), folder=tmp_path)
-    assert result.returncode == 1
-    assert victim.name in result.stdout
-    assert f"`svaedc dataset repair {broken}` recomputes what is broken" in result.stderr
-
-
 def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
     package = tmp_path / "working_dir_files" / "_ray_pkg_1"
     package.mkdir(parents=True)
@@ -122,17 +85,3 @@ def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
     result = svaedc(*absolute, folder=package)
     assert result.returncode == 2, result.stderr
     assert "mlflow.db would be deleted" in result.stderr
-
-
-def test_a_gap_is_told_from_damage_and_condemns_no_file(small_dataset, tmp_path):
-    gappy = tmp_path / "gappy"
-    shutil.copytree(small_dataset, gappy)
-    first = min(gappy.glob("*.parquet"))
-    first.unlink()
-    first.with_name(f"{first.name}.sha256").unlink()
-    result = svaedc("dataset", "verify", str(gappy), folder=tmp_path)
-    assert result.returncode == 1
-    assert result.stdout == "episodes 0 to 7 are not collected yet\n"
-    assert "every file in" in result.stderr
-    assert "delete" not in result.stderr
-    assert svaedc("dataset", "info", str(gappy), folder=tmp_path).returncode == 0

@@ -1,4 +1,4 @@
-"""`svaedc` on an object store: addresses, the commands, and a collection that is killed."""
+"""`svaedc` on an object store: the commands, and a collection that is killed."""
 
 import subprocess
 import sys
@@ -17,8 +17,8 @@ from cluster.datasets.plan import plan_collection
 from cluster.datasets.progress import CollectionProgress
 from cluster.datasets.quarantine import put_aside, quarantined_shards, release
 from cluster.datasets.worker import RolloutActor
-from cluster.errors import UsageError, UserError
-from cluster.inputs import dataset_location, durable_dataset
+from cluster.errors import UserError
+from cluster.inputs import dataset_location
 from svaedc.model import checkpoint
 from workers import setups
 from workers.collection.shard import collect_shard
@@ -66,24 +66,6 @@ def content(folder: Location) -> dict[str, bytes]:
 def run(*arguments: str) -> str:
     """What a command prints to its output; its errors are raised as they are."""
     return CliRunner().invoke(app, ["dataset", *arguments], catch_exceptions=False).output
-
-
-def test_an_address_takes_the_store_of_the_environment_along(monkeypatch):
-    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9000")
-    monkeypatch.setenv("AWS_REGION", "eu-west-1")
-    assert str(durable_dataset("s3://bucket/data")) == (
-        "s3://bucket/data?endpoint_override=127.0.0.1:9000&region=eu-west-1&scheme=http"
-    )
-    assert str(dataset_location("s3://bucket/data?endpoint_override=minio:1&region=home")) == (
-        "s3://bucket/data?endpoint_override=minio:1&region=home"
-    )
-    assert dataset_location("data/franka") == Path("data/franka")
-    assert durable_dataset("data") == Path.cwd() / "data"
-
-
-def test_an_address_of_another_kind_of_store_is_a_usage_error():
-    with pytest.raises(UsageError, match=r"addressed as s3://bucket/prefix, got 'gs://bucket/data'"):
-        dataset_location("gs://bucket/data")
 
 
 def test_a_rollout_process_writes_to_the_store_what_one_writes_to_a_disk(remote, tmp_path):

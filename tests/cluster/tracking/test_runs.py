@@ -1,12 +1,5 @@
-"""Runs in a real MLflow store, and the store's real pages in a real browser."""
+"""Runs in a real MLflow store: everything given is there, and they end as their blocks end."""
 
-import shutil
-import signal
-import socket
-import subprocess
-import sys
-import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -14,20 +7,6 @@ import pytest
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
 from cluster.tracking import open_tracker
-from cluster.tracking.server import serve_ui
-
-REPOSITORY = Path(__file__).parents[3]
-
-
-@pytest.fixture(scope="module")
-def settings(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("tracking")
-    return TrackingSettings(uri=f"sqlite:///{folder}/store/mlflow.db", experiment="tests")
-
-
-@pytest.fixture(scope="module")
-def tracker(settings):
-    return open_tracker(settings)
 
 
 def record(tracker, run):
@@ -128,32 +107,6 @@ def test_resuming_an_unknown_run_is_refused(tracker):
         tracker.resume("no-such-run")
 
 
-def test_a_deleted_experiment_is_named_with_the_remedy(settings, tracker):
-    gone = settings.model_copy(update={"experiment": "gone"})
-    tracker.client.delete_experiment(open_tracker(gone).experiment)
-    with pytest.raises(UserError, match=r"'gone' was deleted.*tracking\.experiment"):
-        open_tracker(gone)
-
-
-def test_a_store_below_a_file_is_refused_with_its_address_and_the_remedy(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match=r"sqlite:////.*file/mlflow\.db cannot be used.*tracking\.uri"):
-        open_tracker(TrackingSettings(uri=f"sqlite:///{tmp_path}/file/mlflow.db"))
-
-
-def test_a_file_that_is_no_database_is_refused_and_left_alone(tmp_path):
-    database = tmp_path / "mlflow.db"
-    database.write_text("the only copy of something else" * 100)
-    with pytest.raises(UserError, match="cannot be used"):
-        open_tracker(TrackingSettings(uri=f"sqlite:///{database}"))
-    assert database.read_text().startswith("the only copy")
-
-
-def test_a_server_that_does_not_answer_is_refused(free_port):
-    with pytest.raises(UserError, match=rf"127\.0\.0\.1:{free_port} cannot be used: .*refused"):
-        open_tracker(TrackingSettings(uri=f"http://127.0.0.1:{free_port}"))
-
-
 def test_a_store_that_fails_at_the_end_does_not_hide_the_blocks_error(tmp_path):
     tracker = open_tracker(TrackingSettings(uri=f"sqlite:///{tmp_path}/mlflow.db"))
     run = tracker.run("ends", "train", {})
@@ -162,112 +115,3 @@ def test_a_store_that_fails_at_the_end_does_not_hide_the_blocks_error(tmp_path):
     with pytest.raises(ValueError, match="the real reason") as raised, run:
         raise ValueError("the real reason")
     assert any("cannot be used" in note for note in raised.value.__notes__)
-
-
-def test_commands_that_create_a_store_at_once_share_one_experiment(tmp_path):
-    program = (
-        "from cluster.config import TrackingSettings; from cluster.tracking import open_tracker;"
-        f"print(open_tracker(TrackingSettings(uri='sqlite:///{tmp_path}/mlflow.db')).experiment)"
-    )
-    command = [sys.executable, "-c", program]
-    with ThreadPoolExecutor(2) as pool:
-        starts = [pool.submit(subprocess.check_output, command, cwd=REPOSITORY, text=True) for _ in range(2)]
-    first, second = (start.result() for start in starts)
-    assert first == second
-
-
-@pytest.mark.slow
-def test_a_store_whose_making_was_killed_is_made_anew(tmp_path):
-    """Killed again and again, each time a little later, until one making comes to its end."""
-    code = (
-        "import sys; from cluster.config import TrackingSettings; from cluster.tracking import open_tracker; "
-    )
-    code += "open_tracker(TrackingSettings(uri=sys.argv[1]))"
-    uri, kills, seconds = f"sqlite:///{tmp_path}/mlflow.db", 0, 0.0
-    while True:
-        making = subprocess.Popen([sys.executable, "-c", code, uri], cwd=REPOSITORY)
-        while making.poll() is None and not list(tmp_path.glob("*.db")):
-            time.sleep(0.01)
-        try:
-            assert making.wait(seconds) == 0
-            break
-        except subprocess.TimeoutExpired:
-            making.kill()
-            making.wait()
-            kills, seconds = kills + 1, seconds + 0.3
-    assert kills > 2
-    tracker = open_tracker(TrackingSettings(uri=uri))
-    assert [path.name for path in tmp_path.glob("*.db")] == ["mlflow.db"]
-    with tracker.run("after all", "collect", {}) as run:
-        pass
-    assert record(tracker, run).info.run_name == "after all"
-
-
-@pytest.fixture
-def served(settings, tracker, free_port):
-    """`svaedc ui` in a process of its own, with one run to show: the process and its page."""
-    with tracker.run("franka push of the browser test", "compare", {}):
-        pass
-    program = (
-        "import sys; from cluster.config import TrackingSettings;"
-        "from cluster.tracking.server import serve_ui;"
-        f"serve_ui(TrackingSettings(uri={settings.uri!r}, experiment='tests'), {free_port},"
-        " lambda page: print(page, flush=True))"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", program],
-        cwd=REPOSITORY,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    yield process, process.stdout.readline().strip()
-    process.kill()
-    process.wait()
-    process.stdout.close()
-
-
-def answers(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-def browse(page: str, profile: Path) -> str:
-    """What a browser shows of a page, once its scripts had time to run."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("no chromium on PATH; `.ci/run` installs it")
-    command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
-    command += ["--no-first-run", "--disable-background-networking", "--disable-component-update"]
-    command += ["--disable-sync", "--disable-dev-shm-usage", f"--user-data-dir={profile}"]
-    command += ["--window-size=1400,900", "--virtual-time-budget=30000", "--dump-dom", page]
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=240).stdout
-
-
-def test_the_served_page_lists_the_run_and_an_interrupt_ends_the_server(served, free_port, tmp_path):
-    process, page = served
-    assert page.startswith(f"http://127.0.0.1:{free_port}/#/experiments/")
-    assert "franka push of the browser test" in browse(page, tmp_path / "profile")
-    process.send_signal(signal.SIGINT)
-    process.wait(timeout=180)
-    assert not answers(free_port)
-
-
-def test_the_server_ends_when_its_command_is_killed_outright(served, free_port):
-    process, _ = served
-    assert answers(free_port)
-    process.kill()
-    process.wait()
-    deadline = time.monotonic() + 120
-    while answers(free_port) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not answers(free_port)
-
-
-def test_a_taken_port_is_named(settings):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(UserError, match=rf"port {port} cannot be served.*--port {port + 1}"):
-            serve_ui(settings, port, print)

@@ -1,6 +1,5 @@
-"""The simulated Daisy: its body, its joints one by one, the ground under it."""
+"""The simulated Daisy: its joints one by one, and the ground under it."""
 
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from workers import setups
 from workers.environments import daisy, daisy_body
 from workers.environments.daisy import NOMINAL, Daisy, DaisyModel
-from workers.simulation.hexapod import Hexapod
-from workers.simulation.world import World
 
 HOME = np.array(daisy.HOME)
+
 REACH = (3.0, 3.0, 3.0)
+
 FEET = {leg: 3 * number + 2 for number, leg in enumerate(daisy_body.LEGS)}
 
 
@@ -74,19 +73,6 @@ def test_bullet_keeps_the_inertia_of_the_description(scene):
         for inertia in ElementTree.fromstring(daisy_body.urdf()).iter("inertia")
     ]
     assert np.array(infos) == pytest.approx(np.array(described))
-
-
-def test_combined_solids_obey_the_parallel_axis_theorem():
-    ball = daisy_body.Solid(2.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
-    other = daisy_body.Solid(2.0, (1.0, 0.0, 0.0), (0.1, 0.1, 0.1))
-    mass, center, inertia = daisy_body.combine((ball, other))
-    assert (mass, center) == (4.0, (0.5, 0.0, 0.0))
-    assert inertia == pytest.approx((0.2, 1.2, 1.2))
-
-
-def test_the_center_of_mass_of_femur_and_tibia_is_the_manufacturer_s():
-    assert daisy_body._femur().center[0] == pytest.approx(0.251, abs=1e-3)
-    assert daisy_body._tibia(1.0).center[0] == pytest.approx(0.184, abs=1e-3)
 
 
 def test_legs_stand_in_their_places(rested):
@@ -219,30 +205,6 @@ def test_a_world_thrown_into_nonsense_recovers(scene):
         scene.step([float("nan")] * 18)
     scene.reset(NOMINAL)
     assert [scene.step(daisy.HOME) for _ in range(20)] == expected
-
-
-def test_a_description_without_a_joint_is_refused_by_its_name():
-    text = daisy_body.urdf().replace('joint name="RM_elbow"', 'joint name="RM_knee"')
-    with (
-        World(time_step=1 / 240, solver_iterations=20) as world,
-        pytest.raises(ValueError, match="RM_elbow"),
-    ):
-        Hexapod(world, replace(daisy.ROBOT, urdf=text))
-
-
-def test_a_description_that_does_not_load_is_refused_with_its_beginning():
-    with (
-        World(time_step=1 / 240, solver_iterations=20) as world,
-        pytest.raises(ValueError, match=r"must be a URDF that Bullet can load, got '<robot name=\"half"),
-    ):
-        Hexapod(world, replace(daisy.ROBOT, urdf='<robot name="half"><link'))
-
-
-def test_models_that_do_not_fit_their_joints_are_refused():
-    with pytest.raises(ValueError, match="home must hold one number per joint"):
-        replace(daisy.ROBOT, home=daisy.HOME[1:])
-    with pytest.raises(ValueError, match="all finite or all infinite"):
-        replace(daisy.ROBOT, speeds=(1.0,) + daisy.UNLIMITED * 5 + daisy.UNLIMITED[1:])
 
 
 @pytest.mark.parametrize(
