@@ -1,4 +1,4 @@
-"""A module of a user's own with functions of badness, right and wrong ones; the fixture `gentle` writes it."""
+"""A user's own module with functions of badness, right and wrong ones; the fixture `gentle` writes it."""
 
 SHIFT = 7
 SOURCE = f"""
