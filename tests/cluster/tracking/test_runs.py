@@ -7,6 +7,7 @@ import pytest
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
 from cluster.tracking import open_tracker
+from cluster.tracking.runs import unusable
 
 
 def record(tracker, run):
@@ -115,3 +116,10 @@ def test_a_store_that_fails_at_the_end_does_not_hide_the_blocks_error(tmp_path):
     with pytest.raises(ValueError, match="the real reason") as raised, run:
         raise ValueError("the real reason")
     assert any("cannot be used" in note for note in raised.value.__notes__)
+
+
+def test_a_store_that_fails_is_told_by_the_first_line_of_its_reason_and_the_remedy():
+    told = str(unusable("sqlite:///runs.db", OSError("disk I/O error\n(Background on this error at: ...)")))
+    assert told.startswith("the MLflow store sqlite:///runs.db cannot be used: disk I/O error; make it")
+    assert "Background" not in told
+    assert "TimeoutError;" in str(unusable("sqlite:///runs.db", TimeoutError()))

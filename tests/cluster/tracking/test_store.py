@@ -10,7 +10,7 @@ import pytest
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
-from cluster.tracking import open_tracker
+from cluster.tracking.store import open_tracker
 
 REPOSITORY = Path(__file__).parents[3]
 
