@@ -116,7 +116,7 @@ def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_ru
     with pytest.raises(UserError, match=r"1 of 2 runs kept failing.*ValueError: trial 0 must have tried"):
         compared("se,matern", runs=1, trials=5)
     errors = (out / "errors.txt").read_text()
-    assert "comparison.py" in errors
+    assert "loop.py" in errors
     assert {sign for sign in errors if not sign.isprintable()} == {"\n"}
     assert len(read_trials(RunKey("matern", 1000).path(out))) == 7
     assert len(read_trials(RunKey("se", 1000).path(out))) == 1

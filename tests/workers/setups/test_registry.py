@@ -1,11 +1,13 @@
 """Setups from users' own modules: found by name, refused with a reason, and told apart by their code."""
 
+import hashlib
 import sys
 
 import pytest
 
 from workers import setups
 from workers.dataset.identity import identity_of
+from workers.setups.registry import SETUPS, file_digest, require_known
 
 OWN = """
 from dataclasses import replace
@@ -76,3 +78,19 @@ def test_another_version_of_a_users_module_has_another_identity(folder):
 def test_setups_that_ship_leave_no_trace_of_their_code_in_the_identity():
     identity = identity_of(setups.load("quadratic-30d"), seed=0, episodes_per_shard=8)
     assert "setup_digest" not in identity.to_json()
+
+
+def test_every_name_that_ships_leads_to_the_setup_of_that_name():
+    assert [setups.load(name).name for name in SETUPS] == list(SETUPS)
+
+
+def test_the_digest_is_that_of_the_bytes_of_the_file(folder):
+    module = setups.import_user_module("mine")
+    assert file_digest(module) == hashlib.sha256((folder / "mine.py").read_bytes()).hexdigest()
+
+
+def test_an_unknown_name_is_refused_with_the_nearest_and_all_that_are_known():
+    with pytest.raises(LookupError, match="unknown gait 'trott'; did you mean 'trot'[?] known: walk, trot"):
+        require_known("trott", "gait", {"walk": 1, "trot": 2})
+    with pytest.raises(LookupError, match="unknown gait 'trot'; known: $"):
+        require_known("trot", "gait", {})
