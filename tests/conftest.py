@@ -67,6 +67,19 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
+@pytest.fixture
+def gentle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file of the importable module `gentle`, a user's own with functions of badness."""
+    from tests.gentle import SOURCE
+
+    path = tmp_path / "modules" / "gentle.py"
+    path.parent.mkdir()
+    path.write_text(SOURCE)
+    monkeypatch.syspath_prepend(path.parent)
+    monkeypatch.delitem(sys.modules, "gentle", raising=False)
+    return path
+
+
 @pytest.fixture(scope="session")
 def object_store(tmp_path_factory: pytest.TempPathFactory):
     """Host and port of a server on loopback that answers as Amazon's S3 does."""

@@ -6,7 +6,7 @@ import torch
 
 from svaedc.bo import methods
 from svaedc.bo.history import History
-from tests.svaedc.fake_latents import problem, quadratic
+from tests.svaedc.bo.fake_latents import problem, quadratic
 
 DIMENSIONS, CANDIDATES = 4, 60
 OFF_POOL = {"random", "botorch", "saasbo", "turbo", "se-acqf", "matern-acqf"}

@@ -1,11 +1,12 @@
-"""Ranges of physics: as they are written out, and as gap levels of a setup."""
+"""Ranges of physics: as they are written out, as gap levels of a setup, and what is drawn from them."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from workers import setups
-from workers.physics import PhysicsRanges, ranges
+from workers.physics import PhysicsRanges, around, ranges
+from workers.randomness import Stream, generator
 
 numbers = st.floats(0, 1e6)
 intervals = st.tuples(numbers, numbers).map(lambda pair: (min(pair), max(pair)))
@@ -55,3 +56,24 @@ def test_an_explicit_gap_has_the_ranges_written_out_and_all_else_at_its_middle(s
 def test_an_explicit_gap_of_an_unknown_parameter_is_refused_with_the_nearest(setup):
     with pytest.raises(LookupError, match="unknown physics parameter 'fricton'; did you mean 'friction'"):
         setup.gap("fricton=1:2")
+
+
+def test_physics_stays_within_its_ranges_and_reaches_both_ends():
+    ranges = around({"mass": 2.0, "friction": 0.3}, 0.05)
+    draws = [ranges.draw(generator(0, Stream.PHYSICS, index)) for index in range(400)]
+    masses = [draw["mass"] for draw in draws]
+    assert 1.9 <= min(masses) < 1.91
+    assert 2.09 < max(masses) <= 2.1
+
+
+def test_physics_does_not_depend_on_the_order_of_declaration():
+    """A dataset's identity stores the ranges sorted by name, and must be able to draw them again."""
+    one = PhysicsRanges({"mass": (1.0, 2.0), "friction": (0.1, 0.2)})
+    other = PhysicsRanges({"friction": (0.1, 0.2), "mass": (1.0, 2.0)})
+    assert one.draw(generator(0, Stream.PHYSICS, 3)) == other.draw(generator(0, Stream.PHYSICS, 3))
+
+
+def test_ranges_cannot_be_changed_afterwards():
+    ranges = around({"mass": 2.0}, 0.05)
+    with pytest.raises(TypeError):
+        ranges.intervals["mass"] = (0.0, 1.0)

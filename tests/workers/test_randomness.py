@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from workers.physics import PhysicsRanges, around
 from workers.randomness import Stream, generator
 
 
@@ -35,24 +34,3 @@ def test_the_numbers_themselves_are_pinned():
 def test_negative_seeds_and_indices_are_refused(seed, index):
     with pytest.raises(ValueError, match="at least 0"):
         generator(seed, Stream.CONTROLLER, index)
-
-
-def test_physics_stays_within_its_ranges_and_reaches_both_ends():
-    ranges = around({"mass": 2.0, "friction": 0.3}, 0.05)
-    draws = [ranges.draw(generator(0, Stream.PHYSICS, index)) for index in range(400)]
-    masses = [draw["mass"] for draw in draws]
-    assert 1.9 <= min(masses) < 1.91
-    assert 2.09 < max(masses) <= 2.1
-
-
-def test_physics_does_not_depend_on_the_order_of_declaration():
-    """A dataset's identity stores the ranges sorted by name, and must be able to draw them again."""
-    one = PhysicsRanges({"mass": (1.0, 2.0), "friction": (0.1, 0.2)})
-    other = PhysicsRanges({"friction": (0.1, 0.2), "mass": (1.0, 2.0)})
-    assert one.draw(generator(0, Stream.PHYSICS, 3)) == other.draw(generator(0, Stream.PHYSICS, 3))
-
-
-def test_ranges_cannot_be_changed_afterwards():
-    ranges = around({"mass": 2.0}, 0.05)
-    with pytest.raises(TypeError):
-        ranges.intervals["mass"] = (0.0, 1.0)

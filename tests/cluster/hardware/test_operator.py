@@ -11,12 +11,13 @@ import pytest
 from cluster.errors import UsageError
 from cluster.hardware import campaign, journal, operator
 from cluster.hardware.journal import IllegalTransition
-from cluster.hardware.lock import FolderLock, FolderTaken, Process
+from cluster.hardware.lock import FolderLock, FolderTaken
 from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
 
 IN_MOTION = 13
+
 AFTER_MOTION = 14
 """Points of the first trial's way, see test_kills."""
 
@@ -157,24 +158,3 @@ def test_the_export_is_the_campaign_and_every_event(tmp_path):
     assert first == {"campaign": "desk-1", **IDENTITY.facts()}
     with closing(opened(tmp_path)) as book:
         assert events == [asdict(event) for event in book.events()]
-
-
-def hold(folder, held, let_go):
-    with FolderLock(folder, 0.0):
-        held.set()
-        let_go.wait()
-
-
-def test_the_lock_names_the_process_that_holds_it_and_dies_with_it(processes, tmp_path):
-    held, let_go = processes.Event(), processes.Event()
-    process = processes.Process(target=hold, args=(tmp_path, held, let_go))
-    process.start()
-    assert held.wait(timeout=180)
-    assert operator.lock.holder(tmp_path) == replace(Process.current(), pid=process.pid)
-    with pytest.raises(FolderTaken, match=f"process {process.pid}"):
-        FolderLock(tmp_path, 0.2)
-    process.kill()
-    process.join()
-    with FolderLock(tmp_path, 5.0):
-        assert operator.lock.holder(tmp_path) == Process.current()
-    assert operator.lock.holder(tmp_path) is None

@@ -1,0 +1,87 @@
+"""The command line as a user meets it: help that teaches, one-line errors, exit codes."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.cluster.cli.command_line import svaedc
+
+COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
+
+COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
+
+
+def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
+    result = svaedc("--help", folder=tmp_path)
+    assert result.returncode == 0
+    for command in (
+        "demo",
+        "collect",
+        "train",
+        "compare",
+        "reproduce",
+        "render",
+        "ui",
+        "dataset",
+        "hardware",
+    ):
+        assert command in result.stdout
+    heavy = {"ray", "torch", "mlflow", "pybullet"}
+    loaded = f"import cluster.cli.main, sys; print(sorted({heavy} & sys.modules.keys()))"
+    listed = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
+    assert listed.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ((*COLLECT, "--setup", "frnaka"), 2, "unknown setup 'frnaka'; did you mean 'franka'?"),
+        ((*COLLECT, "--setup", "franka", "--set", "collect.actor=2"), 2, "did you mean 'collect.actors'?"),
+        (
+            (*COLLECT, "--setup", "franka", "--config", "none.yaml"),
+            2,
+            "cannot read the settings file none.yaml",
+        ),
+        (
+            (*COLLECT, "--setup", "franka", "--address", "127.0.0.1:1"),
+            1,
+            "no Ray cluster answers at 127.0.0.1:1",
+        ),
+        (
+            (*COLLECT, "--setup", "franka", "--set", "tracking.uri=sqlite:////proc/none/mlflow.db"),
+            1,
+            "the MLflow store sqlite:////proc/none/mlflow.db cannot be used",
+        ),
+        (("dataset", "info", "nowhere"), 1, "nowhere holds no dataset"),
+        (("dataset", "verify", "nowhere"), 1, "nowhere holds no dataset"),
+        (("hardware", "status", "nowhere"), 1, "nowhere"),
+        (("collect",), 2, "Missing option"),
+        # That nothing answers there would be found out first, if Ray were started before the refusal.
+        ((*COMPARE, "--methods", ","), 2, "--methods must name at least one of bbk-kl, botorch"),
+        (
+            ("reproduce", "figure-9", "--dataset", "data", "--episodes", "300", "--plan"),
+            2,
+            "--dataset is collected already: leave one out",
+        ),
+        (("reproduce", "figure-9", "--set", "train.latent=15x12"), 2, "leave train.latent out"),
+        ((*COMPARE, "--methods", "se,svae"), 2, "svae need a trained model: name its folder with --model"),
+    ],
+)
+def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
+    result = svaedc(*arguments, folder=tmp_path)
+    assert result.returncode == code, result.stderr
+    assert message in " ".join(result.stderr.replace("│", " ").split())
+    assert "Traceback" not in result.stderr
+
+
+def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
+    package = tmp_path / "working_dir_files" / "_ray_pkg_1"
+    package.mkdir(parents=True)
+    result = svaedc(*COLLECT, "--setup", "franka", folder=package)
+    assert result.returncode == 2, result.stderr
+    assert "data would be deleted with the job's copy of the working directory" in result.stderr
+    absolute = ("collect", "--episodes", "8", "--dataset", str(tmp_path / "data"), "--setup", "franka")
+    result = svaedc(*absolute, folder=package)
+    assert result.returncode == 2, result.stderr
+    assert "mlflow.db would be deleted" in result.stderr

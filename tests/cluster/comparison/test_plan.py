@@ -1,0 +1,112 @@
+"""What a comparison refuses before anything runs: names, grids, models and pools that do not fit."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from cluster.comparison.folder import ComparisonFolder
+from cluster.comparison.plan import Grid, plan_comparison, usable
+from cluster.config import CompareSettings
+from cluster.errors import UsageError, UserError
+from svaedc.model import checkpoint
+from svaedc.model.svae_dc import SvaeDc
+from svaedc.training.presets import Sizes, compact, vary
+from tests.cluster.comparison.comparing import SETTINGS, untrained
+from workers import setups
+
+
+def test_unknown_names_are_refused_with_the_nearest(compared):
+    with pytest.raises(UsageError, match="did you mean 'svae-dc'"):
+        compared("svae-cd")
+    with pytest.raises(UsageError, match="did you mean 'paper'"):
+        compared(gap="papre")
+    with pytest.raises(UsageError, match="did you mean 'object1_mass'"):
+        compared(gap="object1_mas=2")
+    with pytest.raises(UsageError, match=r"object1_mass must satisfy 0 <= low <= high, got \[3.0, 2.0\]"):
+        compared(gap="object1_mass=3:2")
+
+
+@pytest.mark.parametrize(
+    ("methods", "message"),
+    [((), "at least one of bbk-kl, .*, got none"), (("se", "se"), "once, got se, se")],
+)
+def test_a_grid_names_every_method_once_and_at_least_one(methods, message):
+    with pytest.raises(UsageError, match=message):
+        Grid(methods, seed=0, runs=1)
+
+
+def test_a_method_without_its_model_is_refused(compared):
+    with pytest.raises(UsageError, match="svae-dc need a trained model: name its folder with --model"):
+        compared("random,svae-dc")
+
+
+def test_a_model_of_another_setup_or_a_damaged_one_is_refused(compared, tmp_path):
+    with pytest.raises(UserError, match="made for setup 'yumi', not 'franka'"):
+        compared("svae", model=untrained(tmp_path / "other", setup="yumi"))
+    (tmp_path / "other" / "model.pt").write_bytes(b"no")
+    with pytest.raises(UserError, match="damaged"):
+        compared("svae", model=tmp_path / "other")
+    with pytest.raises(UserError, match="cannot use the model"):
+        compared("svae", model=tmp_path / "nowhere")
+
+
+def planned_with(**changes):
+    usual = {
+        "setup": setups.load("franka"),
+        "grid": Grid(("random", "svae-dc"), seed=1000, runs=1),
+        "trials": 5,
+        "gap": "paper",
+        "settings": SETTINGS,
+    }
+    return plan_comparison(**{**usual, **changes})
+
+
+def test_a_model_without_badness_is_refused_for_methods_that_compress_before_anything_runs(tmp_path):
+    torch.manual_seed(0)
+    model = SvaeDc(vary(compact(Sizes(48, 25, 100)), {"model": "svae"}).model)
+    (tmp_path / "svae").mkdir()
+    checkpoint.save(tmp_path / "svae" / "model.pt", model, {"setup": "franka"})
+    with pytest.raises(UserError, match="'svae-dc': the model must predict badness, got an SVAE"):
+        planned_with(model=tmp_path / "svae", folder=tmp_path / "out")
+    planned_with(grid=Grid(("svae",), 1000, 1), model=tmp_path / "svae", folder=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_pool_with_fewer_controllers_than_trials_is_refused_naming_the_setting(tmp_path):
+    few, grid = CompareSettings(pool_size=15), Grid(("screened-random",), 1000, 1)
+    model = untrained(tmp_path / "model")
+    with pytest.raises(
+        UserError, match=r"compare\.pool_size is 15.*may choose from 5 of 15 .* fewer than its 6 trials"
+    ):
+        planned_with(grid=grid, trials=6, model=model, settings=few, folder=tmp_path / "out")
+
+
+def test_runs_of_a_setup_whose_code_has_changed_are_not_mixed(tmp_path):
+    setup = replace(setups.load("franka"), code="1" * 64)
+    plans = [
+        planned_with(grid=Grid(("random",), 1000, 1), setup=each, model=None, folder=tmp_path)
+        for each in (setup, replace(setup, code="2" * 64))
+    ]
+    (tmp_path / "runs").mkdir()
+    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
+    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
+    with pytest.raises(UserError, match=r"with setup_digest '1111.*, not '2222"):
+        ComparisonFolder(tmp_path).claim(plans[1].identity, "")
+
+
+def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):
+    on_franka, on_yumi = (untrained(tmp_path / name, setup=name) for name in ("franka", "yumi"))
+    assert usable(on_franka, setups.load("franka-rehearsal"))[1] == "franka"
+    assert usable(on_franka, setups.load("franka"))[1] == "franka"
+    own = untrained(tmp_path / "own", setup="franka-rehearsal")
+    assert usable(own, setups.load("franka-rehearsal"))[1] == "franka-rehearsal"
+    with pytest.raises(UserError, match="made for setup 'yumi', not 'franka-rehearsal'"):
+        usable(on_yumi, setups.load("franka-rehearsal"))
+    with pytest.raises(UserError, match="made for setup 'franka-rehearsal', not 'franka'"):
+        usable(own, setups.load("franka"))
+
+
+def test_more_slots_than_cpus_are_refused(compared):
+    with pytest.raises(UserError, match="needs 7 CPUs"):
+        compared("random", settings=CompareSettings(slots=7, pool_size=200))
