@@ -10,7 +10,7 @@ def test_the_same_names_give_the_same_numbers():
     assert np.array_equal(generator(3, Stream.POOL, 5).random(8), generator(3, Stream.POOL, 5).random(8))
 
 
-@pytest.mark.parametrize("other", [(4, "pool", 5), (3, "physics", 5), (3, "pool", 6)])
+@pytest.mark.parametrize("other", [(4, Stream.POOL, 5), (3, Stream.PHYSICS, 5), (3, Stream.POOL, 6)])
 def test_other_names_give_other_numbers(other):
     assert not np.isin(generator(*other).random(64), generator(3, Stream.POOL, 5).random(64)).any()
 
