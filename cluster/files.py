@@ -53,7 +53,7 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
     """
     with ExitStack() as stack:
         try:
-            stack.enter_context(_locked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB))
+            stack.enter_context(_lock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB))
         except BlockingIOError as error:
             raise UserError(refusal) from error
         yield
@@ -63,12 +63,12 @@ def alone_in(folder: Path, refusal: str) -> Iterator[None]:
 def turn_in(folder: Path) -> Iterator[None]:
     """Lets commands of this machine into a folder one after the other; it is created first."""
     folder.mkdir(parents=True, exist_ok=True)
-    with _locked(folder, fcntl.LOCK_EX):
+    with _lock(folder, fcntl.LOCK_EX):
         yield
 
 
 @contextmanager
-def _locked(folder: Path, operation: int) -> Iterator[None]:
+def _lock(folder: Path, operation: int) -> Iterator[None]:
     """Holds the kernel's lock on a folder itself: `filelock` would leave a file of its own in it.
 
     The lock is that of this process, which no program that it starts inherits: it ends
