@@ -100,8 +100,8 @@ def strips(setup: Setup, shown: ModelView, moments: Sequence[Moment], size: Size
         seconds = (moment.step + 1) * setup.control_step
         note = badness_note(shown.episode.y)
         panels = [caption(original, f"original {seconds:.2f} s", note, moment.conditions)]
-        for picture, rendition in zip(told, shown.told, strict=True):
-            panels.append(caption(picture, rendition.name, badness_note(rendition.y), ()))
+        for picture, reconstruction in zip(told, shown.told, strict=True):
+            panels.append(caption(picture, reconstruction.name, badness_note(reconstruction.y), ()))
         yield mosaic(panels, len(panels))
 
 

@@ -147,7 +147,7 @@ class Item:
     cost: Cost
 
 
-def bill(reproduction: Reproduction, settings: Settings, cores: int) -> list[Item]:
+def cost_items(reproduction: Reproduction, settings: Settings, cores: int) -> list[Item]:
     """List all steps of a reproduction, with what is left of each.
 
     Args:
@@ -166,7 +166,7 @@ def bill(reproduction: Reproduction, settings: Settings, cores: int) -> list[Ite
 
 
 def lines(reproduction: Reproduction, items: Sequence[Item], cores: int) -> Iterator[str]:
-    """Put the bill into words.
+    """Put the cost into words.
 
     Args:
         reproduction: that is billed.

@@ -10,7 +10,7 @@ from cluster.config import Settings
 from cluster.datasets.collect import collect
 from cluster.datasets.plan import plan_collection
 from cluster.progress import say, timing
-from cluster.reproduction.cost import bill, lines
+from cluster.reproduction.cost import cost_items, lines
 from cluster.reproduction.plan import Reproduction
 from cluster.reproduction.recipe import Panel
 from cluster.reproduction.report import Table, publish, table
@@ -62,7 +62,7 @@ def say_cost(reproduction: Reproduction, settings: Settings, count: int) -> None
     """
     recipe = reproduction.recipe
     say(f"{recipe.figure}: {recipe.label}, {reproduction.runs} runs of each method, in {reproduction.folder}")
-    for line in lines(reproduction, bill(reproduction, settings, count), count):
+    for line in lines(reproduction, cost_items(reproduction, settings, count), count):
         say(line)
 
 

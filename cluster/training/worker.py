@@ -131,7 +131,7 @@ def train_together(job: TrainingJob, mailbox: Any) -> SvaeDc:
 
     Args:
         job: what is trained, from which data.
-        mailbox: handle of a `Mailbox`, for reports.
+        mailbox: the queue of `cluster.runtime.mailbox`, for reports.
 
     Returns:
         This worker's copy of the model.

@@ -1,4 +1,4 @@
-"""The bill of a reproduction."""
+"""The cost of a reproduction."""
 
 import shutil
 
@@ -8,7 +8,7 @@ import pytest
 from cluster.comparison.records import RunKey, append
 from cluster.config import Settings
 from cluster.errors import UserError
-from cluster.reproduction.cost import bill, lines
+from cluster.reproduction.cost import cost_items, lines
 from svaedc.bo.loop import Trial
 from tests.cluster.reproduction.tiny import TINY, costs, plan_of
 
@@ -33,8 +33,8 @@ def test_the_bill_is_the_sum_of_single_costs_and_shrinks_by_what_is_there(tmp_pa
         trial = Trial(index, np.zeros(48, np.float32), 0.1, 0.0, 0.1, False, "ok", 0.1, "")
         (whole.comparison(TINY.panels[0]) / "runs").mkdir(parents=True, exist_ok=True)
         append(RunKey("random", 0).path(whole.comparison(TINY.panels[0])), trial)
-    said = "\n".join(lines(whole, bill(whole, Settings(), 2), 2))
+    said = "\n".join(lines(whole, cost_items(whole, Settings(), 2), 2))
     assert "collect 292 of 300 episodes of franka" in said
     # Four runs of four trials, of which one is half done.
-    assert sum(item.cost.size for item in bill(whole, Settings(), 2)[2:]) == 3.5 * 4 * 400
+    assert sum(item.cost.size for item in cost_items(whole, Settings(), 2)[2:]) == 3.5 * 4 * 400
     assert "in all" in said

@@ -3,7 +3,7 @@
 import torch
 
 from cluster.config import Settings
-from cluster.reproduction.cost import bill
+from cluster.reproduction.cost import cost_items
 from cluster.reproduction.plan import SCALES, resolve
 from cluster.reproduction.recipe import Panel, Recipe
 from svaedc.analysis.evidence import Claim, Successes
@@ -40,4 +40,4 @@ def untrained(folder, setup="franka", latent="3x3"):
 
 
 def costs(reproduction, settings=Settings()):  # noqa: B008 - settings never change
-    return {item.step.split(":")[0]: item.cost for item in bill(reproduction, settings, 2)}
+    return {item.step.split(":")[0]: item.cost for item in cost_items(reproduction, settings, 2)}
