@@ -111,7 +111,4 @@ def test_the_notebook_runs_from_top_to_bottom(tmp_path):
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     printed = "".join(output.get("text", "") for output in outputs if output.output_type == "stream")
     assert "trial 5: f" in printed
-    assert (
-        json.loads(notebook.cells[-1].outputs[0].data["text/plain"].replace("(", "[").replace(")", "]"))[0]
-        == 6
-    )
+    assert notebook.cells[-1].outputs[0].data["text/plain"].startswith("(6, ")
