@@ -108,12 +108,12 @@ def plain(halves, preset):
 
 
 class Clock:
-    """Takes the place of the mailbox: notes the process's CPU time whenever the job reports."""
+    """Takes the place of the driver: notes the process's CPU time whenever the job reports."""
 
     def __init__(self):
-        self.put, self.marks = self, []
+        self.marks = []
 
-    def remote(self, message):
+    def __call__(self, message):
         """Note one report."""
         self.marks.append((message.get("stage"), time.process_time()))
 

@@ -123,28 +123,23 @@ def run_worker(config: dict[str, Any]) -> None:
         config: the `job`, the `threads` of torch and the `mailbox` for reports.
     """
     torch.set_num_threads(config["threads"])
-    train_together(config["job"], config["mailbox"])
+    # Nobody waits for the driver: a report is sent, and training goes on.
+    train_together(config["job"], config["mailbox"].actor.put_nowait.remote)
 
 
-def train_together(job: TrainingJob, mailbox: Any) -> SvaeDc:
+def train_together(job: TrainingJob, send: Callable[[dict[str, Any]], object]) -> SvaeDc:
     """Train one model together with all other workers; rank 0 saves it and reports.
 
     Args:
         job: what is trained, from which data.
-        mailbox: the queue of `cluster.runtime.mailbox`, for reports.
+        send: takes every report.
 
     Returns:
         This worker's copy of the model.
     """
     device = get_device()
     context = _context(job, device)
-    return _train(
-        job,
-        context,
-        device,
-        mailbox.actor.put_nowait.remote,
-        lambda update: ray.train.report({"update": update}),
-    )
+    return _train(job, context, device, send, lambda update: ray.train.report({"update": update}))
 
 
 def train_alone(job: TrainingJob) -> SvaeDc:

@@ -54,7 +54,7 @@ def test_two_processes_train_one_model(job, tmp_path):
     def save_copy(config):
         import ray.train
 
-        model = train_together(config["job"], config["mailbox"])
+        model = train_together(config["job"], config["mailbox"].actor.put_nowait.remote)
         torch.save(model.state_dict(), config["folder"] / f"{ray.train.get_context().get_world_rank()}.pt")
 
     with mailbox([].append) as box:
