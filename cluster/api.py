@@ -20,14 +20,13 @@ from cluster.datasets import collect as collection_driver
 from cluster.datasets.plan import plan_collection, say_complete
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable_dataset, require_working_setup, setup_of
-from cluster.models import TrainedModel
+from cluster.models import TrainedModel, load_model
 from cluster.optimization import hidden_robot
 from cluster.services import services
 from cluster.settings import load_settings
 from cluster.training import train as training_driver
 from svaedc.bo import methods as bo_methods
 from svaedc.bo.loop import Outcome
-from svaedc.model import checkpoint
 from workers.dataset import folder as dataset_folder
 from workers.dataset.folder import Dataset
 from workers.setups import SETUPS, Setup
@@ -73,26 +72,6 @@ def open_dataset(dataset: Path | str) -> Dataset:
         return dataset_folder.open_dataset(dataset_location(str(dataset)))
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
-
-
-def load_model(model: Path | str) -> TrainedModel:
-    """A model that was trained, in evaluation mode, with its metadata.
-
-    Args:
-        model: its folder, or the checkpoint in it.
-
-    Returns:
-        The model, its file and its metadata; `model.latent_means(x)` gives latent paths and badness of x.
-
-    Raises:
-        UserError: it cannot be read.
-    """
-    path = checkpoint.checkpoint_path(Path(model))
-    try:
-        network, metadata = checkpoint.load(path)
-    except (FileNotFoundError, ValueError) as error:
-        raise UserError(f"cannot use the model: {error}") from error
-    return TrainedModel(path, network.requires_grad_(requires_grad=False), metadata)
 
 
 def collect(

@@ -17,6 +17,22 @@ class TrainedModel(NamedTuple):
     metadata: dict[str, Any]
 
 
+def load_model(path: Path | str) -> TrainedModel:
+    """The model in a folder or file, whatever it was trained on; its parameters are frozen.
+
+    `model.latent_means(x)` gives latent paths and badness of controllers.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    file = checkpoint.checkpoint_path(Path(path))
+    try:
+        model, metadata = checkpoint.load(file)
+    except (FileNotFoundError, ValueError) as error:
+        raise UserError(f"cannot use the model: {error}") from error
+    return TrainedModel(file, model.requires_grad_(requires_grad=False), metadata)
+
+
 def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
     """The model in a folder or file, its parameters frozen.
 
@@ -31,14 +47,13 @@ def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
     Raises:
         UserError: it cannot be read, or was trained on another setup.
     """
-    file = checkpoint.checkpoint_path(path)
+    found = load_model(path)
+    trained_on = twin if twin and found.metadata.get("setup") == twin else setup
     try:
-        model, metadata = checkpoint.load(file)
-        trained_on = twin if twin and metadata.get("setup") == twin else setup
-        checkpoint.require(file, metadata, {"setup": trained_on})
-    except (FileNotFoundError, ValueError) as error:
+        checkpoint.require(found.path, found.metadata, {"setup": trained_on})
+    except ValueError as error:
         raise UserError(f"cannot use the model: {error}") from error
-    return TrainedModel(file, model.requires_grad_(requires_grad=False), metadata)
+    return found
 
 
 @cache

@@ -13,8 +13,7 @@ from cluster.inputs import setup_of, usage_errors
 from cluster.models import trained_model
 from cluster.optimization import Optimization
 from svaedc.bo import methods
-from svaedc.bo.history import History
-from svaedc.bo.loop import Trial
+from svaedc.bo.loop import Outcome, Trial, history_of, record
 from svaedc.model.svae_dc import SvaeDc
 from workers.controllers.controller import unit_cube
 from workers.hardware import robots
@@ -83,9 +82,7 @@ class Optimizer:
         index = len(self._trials)
         if index < self._initial:
             return self._optimization.initial(index)
-        history = History.empty(self.setup.dimensions)
-        for trial in self._trials:
-            history = history.append(trial.x, trial.f)
+        history = history_of(self._trials, self.setup.dimensions)
         return self._method.suggest(history, self._optimization.rng(index))
 
     def tell(self, x: np.ndarray, f: float, y: float = math.nan) -> Trial:
@@ -106,18 +103,9 @@ class Optimizer:
         tried = unit_cube(x, self.setup.dimensions)
         if not (math.isnan(y) or 0.0 <= y <= 1.0):
             raise ValueError(f"y must lie in [0, 1], or be NaN where nobody knows it, got {y}")
-        failed, before = not math.isfinite(f), self.best
-        trial = Trial(
-            index=len(self._trials),
-            x=tried,
-            f=math.nan if failed else float(f),
-            y=float(y),
-            best=float(np.fmax(before.f if before else math.nan, math.nan if failed else f)),
-            success=not failed and f > self.setup.success,
-            status="failed" if failed else "ok",
-            seconds=0.0,
-            stop="",
-        )
+        outcome = Outcome(f=float(f), y=float(y), success=bool(f > self.setup.success))
+        best = self._trials[-1].best if self._trials else math.nan
+        trial = record(len(self._trials), tried, outcome, best, seconds=0.0)
         if self._file:
             self._file.parent.mkdir(parents=True, exist_ok=True)
             append(self._file, trial)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -91,25 +91,32 @@ def trials(
     for index in range(len(earlier), len(initial) + count):
         start = clock()
         x = initial[index] if index < len(initial) else method.suggest(history, rng_for(index))
-        outcome = _finite_or_failed(evaluate(x.copy()))
-        history = history.append(x, outcome.f)
-        trial = _record(index, x, outcome, best, clock() - start)
-        best = trial.best
+        trial = record(index, x, evaluate(x.copy()), best, clock() - start)
+        history, best = history.append(x, trial.f), trial.best
         yield trial
 
 
-def _finite_or_failed(outcome: Outcome) -> Outcome:
-    return outcome if math.isfinite(outcome.f) else replace(outcome, f=math.nan)
+def record(index: int, x: Float32[np.ndarray, " D"], outcome: Outcome, best: float, seconds: float) -> Trial:
+    """Make the record of a trial that was evaluated.
 
+    Args:
+        index: Of the trial, from 0.
+        x: Controller, [D].
+        outcome: What it showed; an objective that is not finite counts as none.
+        best: Largest objective of the trials before; NaN for none.
+        seconds: Time of suggesting and evaluating.
 
-def _record(index: int, x: Float32[np.ndarray, " D"], outcome: Outcome, best: float, seconds: float) -> Trial:
-    failed = math.isnan(outcome.f)
+    Returns:
+        The record; the trial failed if it has no objective.
+    """
+    f = outcome.f if math.isfinite(outcome.f) else math.nan
+    failed = math.isnan(f)
     return Trial(
         index=index,
         x=x,
-        f=outcome.f,
+        f=f,
         y=outcome.y,
-        best=float(np.fmax(best, outcome.f)),
+        best=float(np.fmax(best, f)),
         success=outcome.success and not failed,
         status="failed" if failed else "ok",
         seconds=seconds,
@@ -117,8 +124,23 @@ def _record(index: int, x: Float32[np.ndarray, " D"], outcome: Outcome, best: fl
     )
 
 
+def history_of(trials: Sequence[Trial], dimensions: int) -> History:
+    """Collect what a method may learn from.
+
+    Args:
+        trials: Of a run so far, in order.
+        dimensions: D, the length of a controller.
+
+    Returns:
+        Their controllers and objectives.
+    """
+    history = History.empty(dimensions)
+    for trial in trials:
+        history = history.append(trial.x, trial.f)
+    return history
+
+
 def _resume(initial: Float32[np.ndarray, "i D"], earlier: Sequence[Trial]) -> tuple[History, float]:
-    history, best = History.empty(initial.shape[1]), math.nan
     for index, trial in enumerate(earlier):
         if trial.index != index:
             raise ValueError(f"earlier trials must count from 0 without a gap, got {trial.index} at {index}")
@@ -127,5 +149,4 @@ def _resume(initial: Float32[np.ndarray, "i D"], earlier: Sequence[Trial]) -> tu
                 f"trial {index} must have tried the shared controller of its run, and did not: "
                 "continue with the seed and setup the run was started with"
             )
-        history, best = history.append(trial.x, trial.f), trial.best
-    return history, best
+    return history_of(earlier, initial.shape[1]), earlier[-1].best if earlier else math.nan
