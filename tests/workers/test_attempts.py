@@ -42,7 +42,8 @@ def test_an_episode_is_tried_once_more_where_an_earlier_one_may_be_to_blame(own_
         ("self.position, self.speed = 0.0, 0.0", "self.position, self.speed = 0.0, 0.0\n        self.use()"),
         (
             "    def record(self):",
-            "    uses = 0\n\n    def use(self):\n        self.uses += 1\n        assert self.uses < 3\n\n    def record(self):",
+            "    uses = 0\n\n    def use(self):\n        self.uses += 1\n        assert self.uses < 3\n\n"
+            "    def record(self):",
         ),
     )
     with Attempts(setup) as attempts:
@@ -81,7 +82,8 @@ def test_what_hangs_ends_its_process_and_its_traceback_is_told(own_robot, tmp_pa
         name="slow_glider",
     )
     code = (
-        "from workers import setups\nfrom workers.attempts import Attempts\nfrom workers.rollout import draw\n"
+        "from workers import setups\nfrom workers.attempts import Attempts\n"
+        "from workers.rollout import draw\n"
         "setup = setups.load('slow_glider')\n"
         "Attempts(setup, timeout=0.5).rollout(*draw(setup, 0, 0))\n"
     )

@@ -52,7 +52,8 @@ def say(tmp_path):
         write_robot(tmp_path, "glider")
         code = (
             "import json, sys\nimport numpy as np\nfrom dataclasses import replace\n"
-            "from workers.environments.environment import Channel\nfrom workers.physics import PhysicsRanges\n"
+            "from workers.environments.environment import Channel\n"
+            "from workers.physics import PhysicsRanges\n"
             "import glider\nsound = glider.setup()\n"
             "for text in json.load(sys.stdin):\n"
             "    try:\n        print(repr(eval(text)))\n"
@@ -109,7 +110,9 @@ def test_what_a_setup_must_not_state_is_refused_by_name(say):
         "horizon=0": "horizon of glider must be a whole number of at least 1, got 0",
         "control_step=0": "control_step of glider must be above 0, got 0",
         "objective_limits=(2.0, -2.0)": "objective_limits of glider must satisfy low < high, got [2.0, -2.0]",
-        "objective_limits=(0.0, np.inf)": "high of objective_limits of glider must be a finite number, got inf",
+        "objective_limits=(0.0, np.inf)": (
+            "high of objective_limits of glider must be a finite number, got inf"
+        ),
         "broken='never'": "broken of glider must be a finite number, got 'never'",
         "name=''": "the name of a setup must be a text that is not empty, got ''",
         "observation=sound.observation * 2": (
@@ -122,8 +125,8 @@ def test_what_a_setup_must_not_state_is_refused_by_name(say):
             "the parameters of glider must have names that differ, got 'force' twice; rename one"
         ),
         "gaps={'paper': PhysicsRanges({'mass': (1.0, 1.0)})}": (
-            "gap 'paper' of glider must have a range for every physics parameter of data collection and for no "
-            "other; missing or unknown: wind"
+            "gap 'paper' of glider must have a range for every physics parameter of data collection and for "
+            "no other; missing or unknown: wind"
         ),
     }
     told = say(*(f"replace(sound, {change})" for change in expected))

@@ -54,8 +54,7 @@ def test_the_first_shard_of_a_collection_and_a_rederived_one_tell_it(own_robot, 
     assert [bool(report.leak) for report in reports] == [True, False]
     for shard in dataset.shards():
         assert (
-            "is another one when it is rolled out in another order"
-            in rederive(setup, dataset, shard)[0].problem
+            "is another one when it is rolled out in another order" in rederive(setup, dataset, shard)[0].what
         )
 
 

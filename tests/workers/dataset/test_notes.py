@@ -32,7 +32,7 @@ def test_of_a_sound_robot_nothing_is_noted(noted):
     [
         (
             ('"m/s", -5.0, 5.0', '"m/s", -5e6, 5e6'),
-            "channel speed uses 2e-07 of its bounds [-5e+06, 5e+06] m/s",
+            "e-07 of its bounds [-5e+06, 5e+06] m/s: it looks constant to a model",
         ),
         (('"m/s", -5.0, 5.0', '"m/s", -5.0, 1e-9'), "% of the episodes diverged, and no model sees those"),
         (('"m", -5.0, 5.0', '"m", 4.0, 5.0'), "every episode diverged, so there is nothing to learn from"),

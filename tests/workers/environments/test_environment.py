@@ -14,17 +14,17 @@ RETURNS = "return Observed(np.array(records, dtype=np.float32).T, {})"
     [
         (
             "return Observed(np.array(records, dtype=np.float32), {})",
-            "observed() of own_glider gave ξ [20, 2], the setup has 2 channels (position, speed) and 20 steps: "
-            "transpose it",
+            "observed() of own_glider gave ξ [20, 2], the setup has 2 channels (position, speed) and 20 "
+            "steps: transpose it",
         ),
         (
             "return Observed(np.array(records, dtype=np.float32).T[:1], {})",
-            "gave ξ [1, 20], the setup has 2 channels (position, speed) and 20 steps: give one row per channel",
+            "gave ξ [1, 20], the setup has 2 channels (position, speed) and 20 steps: give one row "
+            "per channel",
         ),
         ("return Observed(np.zeros((2, 7), np.float32), {})", "gave ξ [2, 7], the setup has 2 channels"),
         ("return np.array(records).T", "must return Observed(xi, signals) with an array xi, got ndarray"),
         ("return None", "must return Observed(xi, signals) with an array xi, got NoneType"),
-        ("return Observed(np.full((2, 20), 'x'), {})", "must give ξ of numbers, got <U1"),
         (
             RETURNS.replace("{}", "{'touch': np.zeros(3)}"),
             "gave the signal 'touch' with shape [3]; its last axis must be the 20 steps",
