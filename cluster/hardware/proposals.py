@@ -9,11 +9,11 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
+from cluster import methods
 from cluster.errors import UserError
 from cluster.hardware.identity import CampaignIdentity
 from cluster.models import trained_model
 from cluster.optimization import Optimization
-from svaedc.bo import methods
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
 from svaedc.bo.strategies import Method
