@@ -37,14 +37,14 @@ def listed_setups() -> Iterator[Listed]:
         module, _, function = place.partition(":")
         made = getattr(import_module(module), function)
         yield Listed(name, _size(name), (inspect.getdoc(made) or "").partition("\n")[0])
-    yield from _offered(registry.KIND, lambda part: _size(part.name))
+    yield from _plug_ins(registry.KIND, lambda part: _size(part.name))
 
 
 def listed_methods() -> Iterator[Listed]:
     """Every method; those that ship are not imported for it."""
     for name, summary in SUMMARIES.items():
         yield Listed(name, NEEDS_MODEL if methods.needs_model(name) else "", summary)
-    yield from _offered(methods.KIND, lambda part: NEEDS_MODEL if methods.needs_model(part.name) else "")
+    yield from _plug_ins(methods.KIND, lambda part: NEEDS_MODEL if methods.needs_model(part.name) else "")
 
 
 def listed_robots() -> Iterator[Listed]:
@@ -54,7 +54,7 @@ def listed_robots() -> Iterator[Listed]:
     for robot in robots.ROBOTS.values():
         yield Listed(robot.name, f"realises {robot.setup}", robots.STAND_IN)
     yield Listed(f"{robots.REHEARSAL}SETUP", "realises SETUP", f"{robots.STAND_IN}, of any setup")
-    yield from _offered(robots.KIND, lambda part: f"realises {robots.find(part.name).setup}")
+    yield from _plug_ins(robots.KIND, lambda part: f"realises {robots.find(part.name).setup}")
 
 
 def _size(setup: str) -> str:
@@ -62,7 +62,7 @@ def _size(setup: str) -> str:
     return f"{made.dimensions}-D, {made.horizon} steps"
 
 
-def _offered(kind: Kind, facts: Callable[[Part], str]) -> Iterator[Listed]:
+def _plug_ins(kind: Kind, facts: Callable[[Part], str]) -> Iterator[Listed]:
     """What packages offer; one that is broken is listed with its error."""
     search_working_directory()
     for name in dict.fromkeys(each.name for each in kind.offers):

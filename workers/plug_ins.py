@@ -46,7 +46,7 @@ class Kind:
     @property
     def offers(self) -> "tuple[EntryPoint, ...]":
         """What the packages on Python's path offer, by name; nothing of it is imported."""
-        return _installed(self.group, tuple(sys.path))
+        return _entry_points(self.group, tuple(sys.path))
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def find(name: str, kind: Kind) -> Part:
     Raises:
         LookupError: nothing has this name, two packages offer it, or what it leads to cannot be imported.
     """
-    return _imported(name, name if ":" in name else offer(name, kind).value)
+    return _import_part(name, name if ":" in name else offer(name, kind).value)
 
 
 def module_part(name: str) -> Part:
@@ -175,14 +175,14 @@ def file_name(name: str, kind: Kind) -> str:
 
 
 @cache
-def _installed(group: str, path: tuple[str, ...]) -> "tuple[EntryPoint, ...]":  # noqa: ARG001
+def _entry_points(group: str, path: tuple[str, ...]) -> "tuple[EntryPoint, ...]":  # noqa: ARG001
     """The entry points of a group; another path is another question."""
     from importlib.metadata import entry_points
 
     return tuple(sorted(entry_points(group=group), key=lambda each: (each.name, each.value)))
 
 
-def _imported(name: str, target: str) -> Part:
+def _import_part(name: str, target: str) -> Part:
     """What `module:name` leads to."""
     module_name, colon, attributes = target.partition(":")
     parts = attributes.split(".") if colon else []

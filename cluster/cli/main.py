@@ -28,8 +28,8 @@ app = typer.Typer(
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
     "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
-    "`render` shows an episode, `reproduce` makes a figure of the paper; `setups`, `methods` and `robots` list what "
-    "there is. "
+    "`render` shows an episode, `reproduce` makes a figure of the paper; `setups`, `methods` and `robots` "
+    "list what there is. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 

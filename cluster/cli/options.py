@@ -41,8 +41,8 @@ SetupName = Annotated[
     str,
     typer.Option(
         "--setup",
-        help=f"{', '.join(SETUPS)}; one of an installed package (see `svaedc setups`); or your own, as MODULE "
-        "or MODULE:NAME.",
+        help=f"{', '.join(SETUPS)}; one of an installed package (see `svaedc setups`); or your own, as "
+        "MODULE or MODULE:NAME.",
     ),
 ]
 DatasetFolder = Annotated[

@@ -20,8 +20,8 @@ def franka():
     ("name", "message"),
     [
         ("gentle", "must be named as module:function, got 'gentle'"),
-        ("gentle:ruogh", "module 'gentle' has no function 'ruogh'; did you mean 'rough'"),
-        ("gentle:SHIFT", "has no function 'SHIFT'"),
+        ("gentle:ruogh", "module 'gentle' has no 'ruogh'; did you mean 'rough'"),
+        ("gentle:np", "gentle:np must be a function of what an episode showed, got <module"),
         ("gentel:rough", "cannot import the module 'gentel': No module named 'gentel'.*PYTHONPATH"),
     ],
 )
