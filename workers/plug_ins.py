@@ -14,6 +14,7 @@ import inspect
 import re
 import sys
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -148,7 +149,9 @@ def offer(name: str, kind: Kind) -> "EntryPoint":
 
 def package_of(entry: "EntryPoint") -> str:
     """The package that offers it, with its version."""
-    facts: Any = entry.dist.metadata if entry.dist else {}
+    facts: Any = {}
+    with suppress(OSError):  # newer versions of the library raise where there is no METADATA
+        facts = entry.dist.metadata if entry.dist else {}
     known = [facts[fact] for fact in ("Name", "Version") if fact in facts]
     return " ".join(known) or "a package without a name"
 
@@ -167,7 +170,7 @@ def file_name(name: str, kind: Kind) -> str:
     target, _, attributes = (offers[0] if offers else name).partition(":")
     module = sys.modules.get(target)
     if module is None:
-        return f"the file of the {kind.noun} {name}"
+        return f"the file of the {kind.noun} {name!r}"
     value: Any = module
     for attribute in filter(None, attributes.split(".")):
         value = getattr(value, attribute, module)

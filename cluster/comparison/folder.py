@@ -179,7 +179,7 @@ class ComparisonFolder:
             if found.get(name, code) != code:
                 raise UserError(
                     f"{file_name(name, methods.KIND)} has changed since the runs of {name} in {self} were "
-                    "begun; put the file back as it was, or choose another folder with --out"
+                    "begun; put it back as it was, or choose another folder with --out"
                 )
 
     def _is_known(self) -> bool:

@@ -228,6 +228,8 @@ def plan_comparison(
     )
     try:
         job.require(grid.methods, setup)
+    except LookupError as error:
+        raise UsageError(str(error.args[0])) from error
     except ValueError as error:
         raise UserError(f"cannot compare (compare.pool_size is {settings.pool_size}): {error}") from error
     return ComparisonPlan(

@@ -59,7 +59,7 @@ def test_a_name_of_a_package_or_of_a_module_leads_to_what_is_there(lab, name, sa
 def test_what_a_part_leads_to_is_imported_and_no_earlier():
     assert offer("pace", KIND).value == "lab_gaits:Pace"
     assert "lab_gaits" not in sys.modules
-    assert file_name("pace", KIND) == "the file of the gait pace"
+    assert file_name("pace", KIND) == "the file of the gait 'pace'"
     assert find("pace", KIND).value.fast == 3
     assert file_name("pace", KIND) == file_name("lab_gaits:SLOW", KIND) == "lab_gaits.py"
 
