@@ -11,9 +11,9 @@ from cluster.hardware.proposals import fingerprint
 from cluster.hardware.states import Approval
 from cluster.inputs import search_working_directory
 from cluster.optimization import DRAWS
-from workers import setups
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
+from workers.setups import SETUPS, registry
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,6 @@ def identify(
 
 def _codes(setup: str, method: str) -> str:
     """The code of what is a user's own, as JSON; "" where nothing is."""
-    codes = {setup: setups.load(setup).code, method: methods.code(method)}
+    codes = {setup: "" if setup in SETUPS else registry.find(setup).code, method: methods.code(method)}
     own = {name: code for name, code in codes.items() if code}
     return canonical(own) if own else ""
