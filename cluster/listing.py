@@ -67,7 +67,7 @@ def _plug_ins(kind: Kind, facts: Callable[[Part], str]) -> Iterator[Listed]:
     search_working_directory()
     for name in dict.fromkeys(each.name for each in kind.offers):
         entries = [each for each in kind.offers if each.name == name]
-        source = ", ".join(f"{package_of(each)}: {each.value}" for each in entries)
+        source = ", ".join(sorted(f"{package_of(each)}: {each.value}" for each in entries))
         try:
             offer(name, kind)  # refuses a name that ships, and one of two packages
             part = find(name, kind)

@@ -126,7 +126,7 @@ def offer(name: str, kind: Kind) -> "EntryPoint":
         LookupError: there is none (it names the nearest of all names that there are), more than one, or one
             that nobody can ask for.
     """
-    found = [each for each in kind.offers if each.name == name]
+    found = sorted((each for each in kind.offers if each.name == name), key=package_of)
     if not found:
         require_known(name, kind.noun, dict.fromkeys([*kind.shipped, *(each.name for each in kind.offers)]))
     instead = " or ".join(each.value for each in found)
