@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cluster import methods as known_methods
 from cluster.comparison import compare as comparison_driver
 from cluster.comparison.compare import Comparison
 from cluster.comparison.plan import Grid, plan_comparison
@@ -26,7 +27,6 @@ from cluster.optimization import hidden_robot
 from cluster.services import services
 from cluster.settings import load_settings
 from cluster.training import train as training_driver
-from svaedc.bo import methods as bo_methods
 from svaedc.bo.loop import Outcome
 from workers.dataset import folder as dataset_folder
 from workers.dataset.folder import Dataset
@@ -55,7 +55,7 @@ def load_setup(name: str) -> Setup:
 
 def method_names() -> tuple[str, ...]:
     """The methods that `compare` and `Optimizer` know."""
-    return bo_methods.names()
+    return known_methods.names()
 
 
 def open_dataset(dataset: Path | str) -> Dataset:

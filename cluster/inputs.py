@@ -79,7 +79,7 @@ def setup_of(name: str, bad: str = "") -> "Setup":
     Users' modules are found in the working directory too, after everything that is installed.
 
     Args:
-        name: of a setup that ships, or of an importable module.
+        name: of a setup that ships or of an installed package, `module:name`, or an importable module.
         bad: G_bad as `module:function`; "" for the setup's own.
 
     Returns:
@@ -90,8 +90,7 @@ def setup_of(name: str, bad: str = "") -> "Setup":
     """
     from workers.setups.registry import load
 
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))
+    search_working_directory()
     with usage_errors():
         found = load(name)
         if not bad:
@@ -99,6 +98,12 @@ def setup_of(name: str, bad: str = "") -> "Setup":
         from workers.setups.user_bad import with_bad
 
         return with_bad(found, bad)
+
+
+def search_working_directory() -> None:
+    """Let users' modules be found in the working directory too, after everything that is installed."""
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
 
 
 def require_working_setup(setup: "Setup", seed: int) -> "Setup":

@@ -30,7 +30,14 @@ Who = Annotated[str, typer.Option("--who", help="Your name; kept in the journal.
 @app.command()
 def start(
     folder: Folder,
-    robot: Annotated[str, typer.Option("--robot", help="Which robot, such as franka-rehearsal.")],
+    robot: Annotated[
+        str,
+        typer.Option(
+            "--robot",
+            help="Which robot, such as franka-rehearsal (see `svaedc robots`); rehearsal:SETUP simulates any "
+            "setup; your own as MODULE:NAME.",
+        ),
+    ],
     method: Annotated[str, typer.Option("--method", help="How controllers are suggested.")] = "svae-dc",
     model: TrainedModel = None,
     trials: Annotated[

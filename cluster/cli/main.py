@@ -12,6 +12,7 @@ from cluster.cli.check import check
 from cluster.cli.collect import collect
 from cluster.cli.compare import compare
 from cluster.cli.demo import demo
+from cluster.cli.listings import methods, robots, setups
 from cluster.cli.render import render
 from cluster.cli.reproduce import reproduce
 from cluster.cli.train import train
@@ -28,12 +29,13 @@ app = typer.Typer(
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
     "A first look: `svaedc demo`. The steps on their own: `check`, `collect`, `train`, `compare`, "
-    "`hardware`; `render` shows an episode, `reproduce` makes a figure of the paper. "
+    "`hardware`; `render` shows an episode, `reproduce` makes a figure of the paper; `setups`, `methods` and "
+    "`robots` list what there is. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
 
-for _command in (demo, check, collect, train, compare, ui, render, reproduce):
+for _command in (demo, check, collect, train, compare, ui, render, reproduce, setups, methods, robots):
     app.command()(_command)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(hardware.app, name="hardware")

@@ -37,7 +37,14 @@ Address = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Decides every random draw.")]
-SetupName = Annotated[str, typer.Option("--setup", help=f"{', '.join(SETUPS)}, or a module of your own.")]
+SetupName = Annotated[
+    str,
+    typer.Option(
+        "--setup",
+        help=f"{', '.join(SETUPS)}; one of an installed package (see `svaedc setups`); or your own, as "
+        "MODULE or MODULE:NAME.",
+    ),
+]
 DatasetFolder = Annotated[
     Any,  # a Location, which typer does not know
     typer.Option(

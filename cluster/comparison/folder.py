@@ -5,14 +5,23 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
-from cluster import files
+from cluster import files, methods
 from cluster.comparison.records import NAME, RUNS, RunKey, Runs, append, read_trials, write_table
 from cluster.errors import UserError
 from svaedc.bo.loop import Trial
+from workers.plug_ins import file_name
+from workers.setups import registry as setups
+from workers.setups.declared import changes, what_changed
 
 IDENTITY = "comparison.json"
+DECLARED = "setup_declares"
+"""Of a user's own setup, a comparison also knows what it declared, to say what has changed."""
+CODES = "method_digests"
+"""It also knows the code of users' own methods, of those that it has runs of."""
+NO_CODES: Final[Mapping[str, str]] = MappingProxyType({})
 TABLE = "trials.parquet"
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
@@ -66,13 +75,17 @@ class ComparisonFolder:
             files.write_text(self.path / name, text)
         return self.path / name
 
-    def claim(self, identity: Mapping[str, Any], model: str) -> dict[str, Any]:
+    def claim(
+        self, identity: Mapping[str, Any], model: str, codes: Mapping[str, str] = NO_CODES
+    ) -> dict[str, Any]:
         """Begin a comparison here, or check that the one that is here is this one.
 
         Args:
             identity: what all its runs have in common.
             model: hash of the model; "" when no method asked for needs one. It becomes part of the comparison
                 with the first method that does.
+            codes: hashes of the files of users' own methods, by the methods' names. Each becomes part of the
+                comparison with its method.
 
         Returns:
             The identity of the comparison, the model's hash included.
@@ -80,17 +93,20 @@ class ComparisonFolder:
         Raises:
             UserError: the folder holds another comparison, or its `comparison.json` is damaged or gone.
         """
-        found = self._identity(identity) if self._has_begun() else {**identity, "model": ""}
+        found = self._identity(identity) if self._has_begun() else {**identity, "model": "", CODES: {}}
         wanted = {**identity, "model": model or found["model"]}
         for name, value in wanted.items():
-            if found[name] not in (value, ""):
-                raise UserError(
-                    f"{self} holds a comparison with {name} {found[name]!r}, not {value!r}; "
-                    "choose another folder with --out"
-                )
-        if wanted != found or not (self.path / IDENTITY).exists():
-            self.write(IDENTITY, json.dumps(wanted, indent=2) + "\n")
-        return wanted
+            if found[name] not in (value, "", None):
+                raise UserError(f"{self._refusal(name, found, wanted)} choose another folder with --out")
+        self._require_codes(found[CODES], codes)
+        known = {**found[CODES], **codes}
+        whole = {**wanted, **({CODES: known} if known else {})}
+        if (
+            whole != {name: value for name, value in found.items() if value not in (None, {})}
+            or not self._is_known()
+        ):
+            self.write(IDENTITY, json.dumps(whole, indent=2) + "\n")
+        return {name: value for name, value in wanted.items() if name != DECLARED}
 
     def trials(self, key: RunKey) -> list[Trial]:
         """The trials of a run so far.
@@ -191,15 +207,45 @@ class ComparisonFolder:
         """Whether all of these files are here."""
         return all((self.path / name).exists() for name in names)
 
+    def _refusal(self, name: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+        """Why the comparison that is here is not the one that is wanted; what differs first is named."""
+        if name not in ("setup_digest", DECLARED):
+            return f"{self} holds a comparison with {name} {found[name]!r}, not {wanted[name]!r};"
+        file = file_name(wanted["setup"], setups.KIND)
+        before, now = found.get(DECLARED), wanted.get(DECLARED)
+        differing = changes(before, now) if before and now else ()
+        since = f"the comparison in {self} was begun"
+        if name == DECLARED:
+            what = what_changed(differing, "setup")
+            return (
+                f"what {file} declares has changed since {since} ({what}), though the file has not: "
+                "something that it imports or reads has; put that back as it was, or"
+            )
+        said = what_changed(differing, "setup") if before else "what in it, this folder does not tell"
+        return f"{file} has changed since {since} ({said}); put the file back as it was, or"
+
+    def _require_codes(self, found: Mapping[str, str], asked: Mapping[str, str]) -> None:
+        """Refuse methods whose code has changed since runs of them were made."""
+        for name, code in asked.items():
+            if found.get(name, code) != code:
+                raise UserError(
+                    f"{file_name(name, methods.KIND)} has changed since the runs of {name} in {self} were "
+                    "begun; put it back as it was, or choose another folder with --out"
+                )
+
+    def _is_known(self) -> bool:
+        return (self.path / IDENTITY).exists()
+
     def _has_begun(self) -> bool:
-        return (self.path / IDENTITY).exists() or any((self.path / RUNS).iterdir())
+        return self._is_known() or any((self.path / RUNS).iterdir())
 
     def _identity(self, expected: Mapping[str, Any]) -> dict[str, Any]:
         path = self.path / IDENTITY
         try:
-            # Comparisons of before lack the digest.
-            found = {"setup_digest": "", **json.loads(path.read_text(encoding="utf-8"))}
-            return {name: found[name] for name in (*expected, "model")}
+            # Comparisons of before lack the digest, and what a user's setup declared.
+            later: dict[str, Any] = {"setup_digest": "", DECLARED: None, CODES: {}}
+            found = {**later, **json.loads(path.read_text(encoding="utf-8"))}
+            return {name: found[name] for name in (*expected, "model", CODES)}
         except FileNotFoundError as error:
             raise _unknown(path, "is gone, though there are runs") from error
         except (ValueError, TypeError, KeyError) as error:

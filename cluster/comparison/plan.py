@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cluster.comparison.folder import ComparisonFolder
+from cluster import methods
+from cluster.comparison.folder import DECLARED, ComparisonFolder
 from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.worker import ComparisonJob
 from cluster.config import CompareSettings
@@ -14,12 +15,12 @@ from cluster.inputs import usage_errors
 from cluster.models import trained_model
 from cluster.progress import say
 from svaedc.analysis.seeds import common_purpose
-from svaedc.bo import methods
 from workers.dataset.shards import sha256
 from workers.hardware import robots
 from workers.physics import ranges
 from workers.rollout import VERSION
 from workers.setups import Setup
+from workers.setups.declared import declaration
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,7 @@ class ComparisonPlan:
             "pool_size": self.job.pool_size,
             "initial_trials": self.job.initial,
             "rollout_version": VERSION,
+            **({DECLARED: declaration(self.setup)} if self.setup.code else {}),
         }
 
     @property
@@ -154,7 +156,9 @@ class ComparisonPlan:
             UserError: the folder holds another comparison, or runs whose seeds are for something else.
         """
         self.grid.require_purpose(self.job.folder, {key.run for key in self.job.folder.begun_keys()})
-        return self.job.folder.claim(self.identity, self.model)
+        codes = {name: methods.code(name) for name in self.grid.methods}
+        own = {name: code for name, code in codes.items() if code}
+        return self.job.folder.claim(self.identity, self.model, own)
 
     def missing(self, runs: Runs) -> list[RunKey]:
         """The runs asked for that are not whole."""
@@ -225,6 +229,8 @@ def plan_comparison(
     )
     try:
         job.require(grid.methods, setup)
+    except LookupError as error:
+        raise UsageError(str(error.args[0])) from error
     except ValueError as error:
         raise UserError(f"cannot compare (compare.pool_size is {settings.pool_size}): {error}") from error
     return ComparisonPlan(

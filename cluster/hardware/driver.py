@@ -20,6 +20,7 @@ from cluster.hardware.states import State
 from cluster.hardware.status import Phase, Status
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
+from workers.hardware import robots
 
 BROKEN = frozenset({State.FAILED, State.REJECTED})
 
@@ -51,11 +52,15 @@ def start(
         UserError: when the campaign cannot go on without a person; the message says what they must do.
     """
     require_robot_host()
+    robot = robots.find(plan.identity.robot)
+    if robot.simulated:
+        say(f"{robot.name} is a {robots.STAND_IN} for {robot.setup}: no robot moves")
     lifetime = "non_detached" if session.is_local else "detached"
     options = actor_options(plan.identity.robot, settings.namespace, lifetime)
     with _ray_errors(plan), at_the_robot(options, plan, say) as (actor, first):
         parameters = {**asdict(plan.identity), "folder": str(plan.folder)}
-        with tracker.run(first.name, "hardware", parameters, {"svaedc.campaign": first.name}) as run:
+        tags = {"svaedc.campaign": first.name, "svaedc.robot": robots.STAND_IN if robot.simulated else "real"}
+        with tracker.run(first.name, "hardware", parameters, tags) as run:
             return _carry_out(actor, plan, first, run, report, say)
 
 

@@ -1,12 +1,16 @@
 """What makes a hardware campaign this one and no other."""
 
 import hashlib
+import json
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from cluster import methods
 from cluster.errors import UserError
 from cluster.hardware.events import canonical
 from cluster.hardware.states import Approval
+from workers.plug_ins import file_name
+from workers.setups import registry
 
 
 class IdentityMismatch(UserError):  # noqa: N818 - it is an expected refusal, not a defect
@@ -28,6 +32,8 @@ class CampaignIdentity:
         approval: who lets a controller onto the robot.
         draws: version of how controllers are drawn, `cluster.optimization.DRAWS`; nobody asks for one, a
             campaign keeps the one that it began with.
+        codes: SHA-256 of the files of a user's own setup and method by their names, as JSON; "" where both
+            ship, and of campaigns that began before there was such a field.
     """
 
     robot: str
@@ -39,6 +45,7 @@ class CampaignIdentity:
     trials: int
     approval: Approval
     draws: int = 1
+    codes: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -53,8 +60,8 @@ class CampaignIdentity:
         return hashlib.sha256(canonical({**self.facts(), "name": name}).encode()).hexdigest()
 
     def facts(self) -> dict[str, Any]:
-        """All fields by name; `draws` is left out of campaigns that began before there was such a field."""
-        return {field: value for field, value in asdict(self).items() if (field, value) != ("draws", 1)}
+        """All fields by name; what campaigns of before lack is left out of them."""
+        return {field: value for field, value in asdict(self).items() if (field, value) not in _BEFORE}
 
     def require(self, asked: "CampaignIdentity", place: str) -> None:
         """Refuses another campaign in the same folder.
@@ -66,10 +73,24 @@ class CampaignIdentity:
         Raises:
             IdentityMismatch: naming the first field that differs.
         """
-        for field, here in asdict(replace(self, draws=asked.draws)).items():
+        if self.codes and asked.codes:
+            self._require_codes(asked, place)
+        for field, here in asdict(replace(self, draws=asked.draws, codes=asked.codes)).items():
             there = getattr(asked, field)
             if here != there:
                 raise IdentityMismatch(
                     f"{place} holds a campaign with {field} {str(here)!r}, asked for {str(there)!r}; "
                     f"repeat the command with {field} {str(here)!r} or choose another folder"
                 )
+
+    def _require_codes(self, asked: "CampaignIdentity", place: str) -> None:
+        here, there = json.loads(self.codes), json.loads(asked.codes)
+        for name, kind in ((self.setup, registry.KIND), (self.method, methods.KIND)):
+            if here.get(name) != there.get(name, here.get(name)):
+                raise IdentityMismatch(
+                    f"{file_name(name, kind)} has changed since the campaign in {place} was begun; put the "
+                    "file back as it was, or choose another folder"
+                )
+
+
+_BEFORE = (("draws", 1), ("codes", ""))

@@ -185,13 +185,13 @@ class Journal:
         if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
             raise _absent(self.path)
         try:
-            # Journals of svaedc 0.1.0 have no column `draws`.
+            # Journals of svaedc 0.1.0 have neither `draws` nor `codes`.
             row = self._connection.execute("SELECT * FROM campaign").fetchone()
             if row is None:
                 raise corrupt(self.path, "it names no campaign")
-            _, name, robot, setup, method, seed, model, pool, trials, approval, *draws = row
+            _, name, robot, setup, method, seed, model, pool, trials, approval, *later = row
             return name, CampaignIdentity(
-                robot, setup, method, seed, model, pool, trials, Approval(approval), *draws
+                robot, setup, method, seed, model, pool, trials, Approval(approval), *later
             )
         except (ValueError, TypeError) as error:
             raise corrupt(self.path, str(error)) from error

@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from cluster import methods
 from cluster.errors import UsageError
+from cluster.hardware.events import canonical
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.proposals import fingerprint
 from cluster.hardware.states import Approval
+from cluster.inputs import search_working_directory
 from cluster.optimization import DRAWS
-from svaedc.bo import methods
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
+from workers.setups import SETUPS, registry
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,26 @@ def identify(
         UserError: when the model cannot be read.
     """
     try:
-        setup, needs_model = robots.find(robot).setup, methods.needs_model(method)
+        search_working_directory()
+        known, needs_model = robots.find(robot), methods.needs_model(method)
+        if approval is Approval.POLICY and not known.simulated:
+            raise UsageError(
+                f"--approval policy lets every trial run by itself: {robot!r} must be a simulated stand-in "
+                "for it, and is none; say --approval operator"
+            )
         if needs_model and model is None:
             raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
         digest = fingerprint(model) if needs_model and model else ""
-        return CampaignIdentity(robot, setup, method, seed, digest, pool, trials, approval, DRAWS)
+        codes = _codes(known.setup, method)
+        return CampaignIdentity(
+            robot, known.setup, method, seed, digest, pool, trials, approval, DRAWS, codes
+        )
     except (LookupError, ValueError) as error:
         raise UsageError(str(error.args[0])) from error
+
+
+def _codes(setup: str, method: str) -> str:
+    """The code of what is a user's own, as JSON; "" where nothing is."""
+    codes = {setup: "" if setup in SETUPS else registry.find(setup).code, method: methods.code(method)}
+    own = {name: code for name, code in codes.items() if code}
+    return canonical(own) if own else ""

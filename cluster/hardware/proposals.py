@@ -9,11 +9,12 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
+from cluster import methods
 from cluster.errors import UserError
 from cluster.hardware.identity import CampaignIdentity
+from cluster.inputs import usage_errors
 from cluster.models import trained_model
 from cluster.optimization import Optimization
-from svaedc.bo import methods
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
 from svaedc.bo.strategies import Method
@@ -50,8 +51,7 @@ class Proposals:
             The proposals.
 
         Raises:
-            LookupError: when there is no such method.
-            UserError: when the model is missing, damaged, or another setup's.
+            UserError: when there is no such method, or the model is missing, damaged, or another setup's.
         """
         needs_model = methods.needs_model(identity.method)
         optimization = Optimization(
@@ -63,7 +63,9 @@ class Proposals:
             identity.draws,
         )
         problem = optimization.problem()
-        return cls(optimization, methods.build(identity.method, problem), problem.latents)
+        with usage_errors():
+            method = methods.build(identity.method, problem)
+        return cls(optimization, method, problem.latents)
 
     def random(self, index: int) -> Float32[np.ndarray, " D"]:
         """The random controller of one of the first trials, by its index."""

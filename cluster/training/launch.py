@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from ray.train import RunConfig, ScalingConfig, TrainingFailedError
+from ray.train import ScalingConfig, TrainingFailedError
 from ray.train.torch import TorchTrainer
-from ray.train.v2.api.config import FailureConfig
+from ray.train.v2.api.config import FailureConfig, RunConfig
 
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError

@@ -1,8 +1,6 @@
 """How the next controller is suggested: the competitors of a comparison, by name."""
 
-import difflib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from typing import Final
 
@@ -16,6 +14,7 @@ from svaedc.bo.acquisition import (
     ucb,
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
+from svaedc.bo.method_names import MethodName, names, needs_model
 from svaedc.bo.strategies import (
     BayesianOptimization,
     Method,
@@ -25,6 +24,8 @@ from svaedc.bo.strategies import (
 )
 from svaedc.bo.surrogates import LEAST_BAD, Surrogate
 
+__all__ = ["build", "names", "needs_model", "require"]
+
 SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "se": partial(surrogates.on_controllers, kernels.se),
     "matern": partial(surrogates.on_controllers, kernels.matern),
@@ -32,7 +33,8 @@ SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "saasbo": partial(surrogates.packaged_gp, gp.saas),
     "turbo": partial(surrogates.packaged_gp, gp.turbo),
 }
-"""These methods learn from the controllers as they are; a new competitor is one line here or below."""
+"""These methods learn from the controllers as they are; a new competitor is one line here or below, and one
+in `svaedc.bo.method_names`."""
 
 LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "svae": partial(surrogates.on_paths, kernels.se),
@@ -50,60 +52,10 @@ LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
 
 _SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
 _ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
-_OURS, _PRACTITIONERS = ("pool", "ucb"), ("acqf", "ei")
-_DEFAULTS: Final = {name: _OURS for name in SURROGATES | LATENT_SURROGATES} | {
-    name: _PRACTITIONERS for name in ("botorch", "saasbo", "turbo")
-}
 _RANDOM: Final[dict[str, Callable[[Problem], Method]]] = {
     "random": lambda problem: UniformSearch(problem.dimensions),
     "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),
 }
-_NAMED_VARIANTS: Final = ("se-acqf", "matern-acqf")
-
-
-@dataclass(frozen=True)
-class _Name:
-    """A method's name, read: `svae-dc-acqf-ei` is `svae-dc` by gradients with expected improvement."""
-
-    base: str
-    search: str
-    acquisition: str
-
-    @classmethod
-    def read(cls, name: str) -> "_Name":
-        """The parts of a name; what it leaves out is the default of its method.
-
-        Raises:
-            LookupError: No method has this name, or it has a shorter one.
-        """
-        base, acquisition = _without_suffix(name, _ACQUISITIONS)
-        base, search = _without_suffix(base, _SEARCHES)
-        if name in _RANDOM:
-            return cls(name, "", "")
-        if base not in _DEFAULTS:
-            raise LookupError(_unknown(name))
-        usual_search, usual_acquisition = _DEFAULTS[base]
-        if search == usual_search or acquisition == usual_acquisition:
-            raise LookupError(
-                f"method must not repeat what {base!r} does anyway ({usual_search}, {usual_acquisition}), "
-                f"got {name!r}: leave that part out"
-            )
-        return cls(base, search or usual_search, acquisition or usual_acquisition)
-
-
-def names() -> tuple[str, ...]:
-    """The methods of the comparison. Most also take `-pool` or `-acqf`, then `-ucb` or `-ei`, behind them."""
-    return tuple(sorted([*_RANDOM, *_DEFAULTS, *_NAMED_VARIANTS]))
-
-
-def needs_model(name: str) -> bool:
-    """Whether a method needs the latents of a trained model.
-
-    Raises:
-        LookupError: There is no such method.
-    """
-    base = _Name.read(name).base
-    return base in LATENT_SURROGATES or base == "screened-random"
 
 
 def build(name: str, problem: Problem) -> Method:
@@ -120,7 +72,7 @@ def build(name: str, problem: Problem) -> Method:
         LookupError: There is no such method.
         ValueError: The problem lacks the latents or the pool that the method needs.
     """
-    read = _Name.read(name)
+    read = MethodName.read(name)
     try:
         return _RANDOM[name](problem) if name in _RANDOM else _optimization(read, problem)
     except ValueError as error:
@@ -159,19 +111,9 @@ def _pool_of(method: Method) -> Candidates | None:
     return None
 
 
-def _optimization(name: _Name, problem: Problem) -> Method:
+def _optimization(name: MethodName, problem: Problem) -> Method:
     if name.search == "pool" and not len(problem.pool):
         raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
     kind = TrustRegionOptimization if name.base == "turbo" else BayesianOptimization
     surrogate = (SURROGATES | LATENT_SURROGATES)[name.base](problem)
     return kind(surrogate, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])
-
-
-def _without_suffix(name: str, suffixes: Mapping[str, object]) -> tuple[str, str]:
-    base, _, last = name.rpartition("-")
-    return (base, last) if last in suffixes else (name, "")
-
-
-def _unknown(name: str) -> str:
-    nearest = difflib.get_close_matches(name, names(), n=1, cutoff=0.0)[0]
-    return f"method must be one of {', '.join(names())}, got {name!r}: did you mean {nearest!r}?"

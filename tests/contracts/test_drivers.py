@@ -18,7 +18,7 @@ from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
 PAGE = Path(__file__).parents[2] / "docs" / "hardware.md"
-REHEARSALS = sorted(robots.ROBOTS.keys() & setups.SETUPS.keys())
+REHEARSALS = [*sorted(robots.ROBOTS.keys() & setups.SETUPS.keys()), "rehearsal:quadratic-30d"]
 """Robots that are setups too are simulated; a test that connected another would move it."""
 
 SEED = 3
@@ -52,7 +52,7 @@ def documented(play) -> Robot:
 
 @pytest.fixture(scope="module", params=[*REHEARSALS, "lab-arm"])
 def robot(request):
-    return robots.find(request.param) if request.param in robots.ROBOTS else documented(still)
+    return robots.find(request.param) if request.param in REHEARSALS else documented(still)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_the_robot_knows_what_became_of_a_trial_whatever_process_asks(robot, ran
 
 @pytest.mark.parametrize("robot", REHEARSALS, indirect=True, scope="module")
 def test_a_rehearsal_moves_as_the_setup_of_its_own_name(robot, x, ran):
-    setup = setups.load(robot.name)
+    setup = setups.load(robot.name.removeprefix(robots.REHEARSAL))
     physics = setup.gap("wide").draw(generator(SEED, Stream.HIDDEN_PHYSICS, 0))
     with setup.open() as environment:
         episode = rollout(setup, environment, x.astype(np.float32), physics)

@@ -135,13 +135,9 @@ def create(folder: Location, identity: Identity) -> Dataset:
     folder.mkdir(parents=True, exist_ok=True)
     _require_own_shards(folder, identity)
     dataset = _open(folder, ensure_manifest(folder, manifest_text(identity)))
-    differences = dataset.identity.differences(identity)
-    if differences:
-        raise ValueError(
-            f"{folder} holds another dataset; it and what was asked for differ in "
-            + "; ".join(differences)
-            + ". Choose another folder, or ask for the same"
-        )
+    refusal = dataset.identity.refusal(identity, folder)
+    if refusal:
+        raise ValueError(refusal)
     return dataset
 
 

@@ -2,13 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from importlib.metadata import version
 from typing import Any
 
+from workers.plug_ins import file_name
 from workers.rollout import VERSION as ROLLOUT_VERSION
-from workers.setups import Setup
+from workers.setups import Setup, registry, user_bad
+from workers.setups.declared import ABSENT, Change, changes, what_changed
 
 SCHEMA_VERSION = 1
 STORAGES = ("float32", "int16")
@@ -100,13 +102,66 @@ class Identity:
             raise ValueError(f"no identity of a dataset: {error!r}") from error
 
     def differences(self, other: "Identity") -> tuple[str, ...]:
-        """One line for every field in which two identities differ."""
-        pairs = (
-            (field.name, getattr(self, field.name), getattr(other, field.name)) for field in fields(self)
-        )
-        return tuple(
-            f"{name}: {_brief(mine)} and {_brief(theirs)}" for name, mine, theirs in pairs if mine != theirs
-        )
+        """One line for everything in which two identities differ."""
+        return tuple(map(str, self._changes(other, [field.name for field in fields(self)])))
+
+    def refusal(self, asked: "Identity", place: object) -> str:
+        """Say why a place that holds this dataset is none for another one.
+
+        Args:
+            asked: what is to be collected into it.
+            place: of this dataset.
+
+        Returns:
+            What differs, and what to do; "" when nothing does.
+        """
+        left = [field.name for field in fields(self)]
+        files = []
+        for name, digest, kind, declared in _FILES:
+            if self._has_changed(asked, name, digest):
+                said = what_changed(
+                    self._changes(asked, [each for each in declared if each in left]), kind.noun
+                )
+                file = file_name(getattr(self, name), kind)
+                files.append(f"{file} has changed since the dataset in {place} was begun ({said})")
+                left = [each for each in left if each not in (digest, *declared)]
+        others = "; ".join(map(str, self._changes(asked, left)))
+        if files:
+            more = f"; it and what was asked for also differ in {others}" if others else ""
+            return f"{'; '.join(files)}{more}. Choose another folder, or put the file back as it was"
+        if others:
+            return (
+                f"{place} holds another dataset; it and what was asked for differ in {others}. "
+                "Choose another folder, or ask for the same"
+            )
+        return ""
+
+    def _has_changed(self, asked: "Identity", name: str, digest: str) -> bool:
+        """Whether a file of the user's is another version of the one that this dataset was made with."""
+        before, now = getattr(self, digest), getattr(asked, digest)
+        return getattr(self, name) == getattr(asked, name) and before != now and bool(before and now)
+
+    def _changes(self, other: "Identity", names: Sequence[str]) -> Iterator[Change]:
+        """What differs in these fields; of digests, only those of the same file, cut."""
+        one, two = ({name: getattr(side, name) for name in names} for side in (self, other))
+        for name, digest, kind, _ in _FILES:
+            codes = [side.pop(digest, "") for side in (one, two)]
+            if codes[0] != codes[1] and getattr(self, name) == getattr(other, name):
+                file = file_name(getattr(self, name), kind)
+                yield Change(f"the code of {file}", *(code[:12] or ABSENT for code in codes))
+        yield from changes(one, two)
+
+
+_FILES = (
+    (
+        "setup",
+        "setup_digest",
+        registry.KIND,
+        ("parameters", "observation", "conditions", "horizon", "control_step", "physics", "bad_kind"),
+    ),
+    ("bad_name", "bad_digest", user_bad.KIND, ("conditions", "bad_kind")),
+)
+"""Each file of a user's: the fields of its name and of its digest, its kind, and what it declares."""
 
 
 def identity_of(
@@ -145,8 +200,3 @@ def identity_of(
         setup_digest=setup.code,
         storage=storage,
     )
-
-
-def _brief(value: object) -> str:
-    text = str(value)
-    return text if len(text) <= 80 else text[:77] + "..."

@@ -16,6 +16,8 @@ from workers.randomness import Stream, generator
 from workers.rollout import rollout
 from workers.setups import Setup
 
+GAP = "wide"
+"""The hidden physics is drawn from this one of the setup's gaps."""
 LONGEST_PACE_SECONDS = 86_400.0
 """The pace is at most a day, for a clock cannot wait for just any number."""
 
@@ -40,7 +42,7 @@ class RehearsalRobot:
         self.name = name
         self.setup = setup.name
         self._simulated = setup
-        self._physics = setup.gaps["wide"].draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
+        self._physics = setup.gap(GAP).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
         self._pace = pace
         self._ledger = MotionLedger(folder / ledger.FILE)
         self._stopped = threading.Event()

@@ -1,13 +1,16 @@
 """A setup with G_bad of a user's own, named as `module:function`."""
 
-import difflib
 import inspect
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
-from workers.setups.registry import file_digest, import_user_module
+from workers import plug_ins
+from workers.plug_ins import Kind
+from workers.setups.registry import file_digest
 from workers.setups.setup import Setup
 from workers.tasks.own_bad import OwnBad, marked_conditions
+
+KIND: Final = Kind("G_bad", "svaedc.bad", ())
 
 
 def with_bad(setup: Setup, name: str) -> Setup:
@@ -41,14 +44,9 @@ def with_bad(setup: Setup, name: str) -> Setup:
 
 
 def _function(name: str) -> Any:
-    module_name, _, function_name = name.partition(":")
-    if not module_name or not function_name:
+    if ":" not in name:
         raise LookupError(f"G_bad must be named as module:function, got {name!r}")
-    module = import_user_module(module_name)
-    function = getattr(module, function_name, None)
+    function = plug_ins.find(name, KIND).value
     if not inspect.isfunction(function):
-        there = [key for key, value in vars(module).items() if inspect.isfunction(value)]
-        nearest = difflib.get_close_matches(function_name, there, n=1, cutoff=0.0)
-        hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
-        raise LookupError(f"module {module_name!r} has no function {function_name!r}{hint}")
+        raise LookupError(f"{name} must be a function of what an episode showed, got {function!r}")
     return function

@@ -1,11 +1,12 @@
 """What a comparison refuses before anything runs: names, grids, models and pools that do not fit."""
 
+import json
+import sys
 from dataclasses import replace
 
 import pytest
 import torch
 
-from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.plan import Grid, plan_comparison, usable
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
@@ -14,6 +15,19 @@ from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.presets import Sizes, compact, vary
 from tests.cluster.comparison.comparing import SETTINGS, untrained
 from workers import setups
+
+CART = """
+from workers import setups
+
+def setup():
+    return setups.load("quadratic-30d")
+"""
+METHOD = """
+from svaedc.bo.strategies import UniformSearch
+
+def mine(problem):
+    return UniformSearch(problem.dimensions)
+"""
 
 
 def test_unknown_names_are_refused_with_the_nearest(compared):
@@ -82,17 +96,70 @@ def test_a_pool_with_fewer_controllers_than_trials_is_refused_naming_the_setting
         planned_with(grid=grid, trials=6, model=model, settings=few, folder=tmp_path / "out")
 
 
-def test_runs_of_a_setup_whose_code_has_changed_are_not_mixed(tmp_path):
-    setup = replace(setups.load("franka"), code="1" * 64)
-    plans = [
-        planned_with(grid=Grid(("random",), 1000, 1), setup=each, model=None, folder=tmp_path)
-        for each in (setup, replace(setup, code="2" * 64))
-    ]
-    (tmp_path / "runs").mkdir()
-    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
-    ComparisonFolder(tmp_path).claim(plans[0].identity, "")
-    with pytest.raises(UserError, match=r"with setup_digest '1111.*, not '2222"):
-        ComparisonFolder(tmp_path).claim(plans[1].identity, "")
+def claimed(folder, setup, methods=("random",)):
+    plan = planned_with(grid=Grid(methods, 1000, 1), setup=setup, model=None, folder=folder)
+    (folder / "runs").mkdir(exist_ok=True)
+    return plan.claim()
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A setup of a user's own, whose module is loaded."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "cart_pole.py").write_text(CART)
+    yield setups.load("cart_pole")
+    sys.modules.pop("cart_pole")
+
+
+def test_runs_of_a_setup_whose_code_has_changed_are_not_mixed(tmp_path, own):
+    assert claimed(tmp_path, own) == claimed(tmp_path, own)
+    since = rf"cart_pole\.py has changed since the comparison in {tmp_path} was begun"
+    remedy = "put the file back as it was, or choose another folder with --out"
+    with pytest.raises(
+        UserError, match=rf"{since} \(nothing that its setup declares: its code did\); {remedy}"
+    ):
+        claimed(tmp_path, replace(own, code="2" * 64))
+    with pytest.raises(
+        UserError, match=rf"{since} \(horizon was 2, is 9; success was .*, is 0\.5\); {remedy}"
+    ):
+        claimed(tmp_path, replace(own, code="2" * 64, horizon=9, success=0.5))
+    with pytest.raises(
+        UserError,
+        match=r"what cart_pole\.py declares has changed .* \(horizon was 2, is 9\), though the file has not",
+    ):
+        claimed(tmp_path, replace(own, horizon=9))
+
+
+def test_a_folder_that_does_not_know_what_a_setup_declared_learns_it(tmp_path, own):
+    claimed(tmp_path, own)
+    path = tmp_path / "comparison.json"
+    identity = json.loads(path.read_text())
+    declared = identity.pop("setup_declares")
+    path.write_text(json.dumps(identity))
+    with pytest.raises(
+        UserError, match=r"was begun \(what in it, this folder does not tell\); put the file back"
+    ):
+        claimed(tmp_path, replace(own, code="2" * 64, horizon=9))
+    assert "setup_declares" not in claimed(tmp_path, own)
+    assert json.loads(path.read_text()) == {**identity, "setup_declares": declared}
+
+
+def test_runs_of_a_method_whose_code_has_changed_are_not_mixed_and_those_of_others_go_on(tmp_path, own):
+    module = tmp_path / "my_method.py"
+    module.write_text(METHOD)
+    claimed(tmp_path, own)
+    assert "method_digests" not in json.loads((tmp_path / "comparison.json").read_text())
+    claimed(tmp_path, own, ("random", "my_method:mine"))
+    module.write_text(module.read_text() + "# changed\n")
+    with pytest.raises(
+        UserError,
+        match=r"my_method\.py has changed since the runs of my_method:mine in .* were begun; put it back",
+    ):
+        claimed(tmp_path, own, ("my_method:mine",))
+    claimed(tmp_path, own)
+    sys.modules.pop("my_method")
+    digests = json.loads((tmp_path / "comparison.json").read_text())["method_digests"]
+    assert list(digests) == ["my_method:mine"]
 
 
 def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):

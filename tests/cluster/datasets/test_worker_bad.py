@@ -23,7 +23,7 @@ def test_a_worker_loads_the_function_by_its_name_and_refuses_another_file(tmp_pa
     assert dataset.read(Shard(0, 2)).bad.dtype == np.float32
     gentle.write_text(SOURCE.replace("200 * x", "201 * x"))
     monkeypatch.delitem(sys.modules, "gentle")
-    with pytest.raises(ValueError, match=r"would roll out other episodes .* differ in bad_digest: "):
+    with pytest.raises(ValueError, match=r"would roll out other episodes .* differ in the code of .*: "):
         RolloutActor("franka", str(dataset.folder), 60.0)
 
 

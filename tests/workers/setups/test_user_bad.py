@@ -20,8 +20,8 @@ def franka():
     ("name", "message"),
     [
         ("gentle", "must be named as module:function, got 'gentle'"),
-        ("gentle:ruogh", "module 'gentle' has no function 'ruogh'; did you mean 'rough'"),
-        ("gentle:SHIFT", "has no function 'SHIFT'"),
+        ("gentle:ruogh", "module 'gentle' has no 'ruogh'; did you mean 'rough'"),
+        ("gentle:np", "gentle:np must be a function of what an episode showed, got <module"),
         ("gentel:rough", "cannot import the module 'gentel': No module named 'gentel'.*PYTHONPATH"),
     ],
 )
@@ -32,7 +32,7 @@ def test_a_function_that_is_not_there_is_named(franka, name, message):
 
 def test_a_module_that_is_no_python_is_refused_with_the_place(franka, gentle):
     (gentle.parent / "broken.py").write_text("def rough(:\n")
-    with pytest.raises(LookupError, match=r"cannot import the module 'broken': .*broken\.py, line 1"):
+    with pytest.raises(LookupError, match=r"cannot import the module 'broken': .*broken\.py:1"):
         with_bad(franka, "broken:rough")
 
 
