@@ -21,7 +21,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-import gymnasium
 import numpy as np
 
 from workers.controllers.controller import Controller
@@ -152,7 +151,7 @@ def gymnasium_setup(
         objective: f; the sum of all rewards unless given.
         info: names of numbers in Gymnasium's `info` that conditions or f need, as signals.
         physics: ranges of data collection; None for none.
-        gaps: further gap levels; `paper`, `training` and `wide` are the ranges of data collection unless given.
+        gaps: gap levels; `paper`, `training` and `wide` are the ranges of data collection unless given.
         apply: puts the physics of an episode into the environment before it is reset.
         renew: what becomes of the environment after an episode, `make_anew` or `keep`.
         control_step: s of one step; None takes the `dt` of the environment.
@@ -162,7 +161,7 @@ def gymnasium_setup(
         The setup, named after the environment.
 
     Raises:
-        ValueError: the environment and what is said of it do not go together; the message says how they would.
+        ValueError: the environment and what is said of it do not go together; the message tells how to.
     """
     ranges = PhysicsRanges({}) if physics is None else physics
     world = make()
@@ -214,8 +213,8 @@ def _require_time(world: World, horizon: int) -> None:
     limit = world.spec.max_episode_steps if world.spec else None
     if limit is not None and horizon > limit:
         raise ValueError(
-            f"horizon must be at most the {limit} steps after which {name_of(world)} truncates its episodes, got "
-            f"{horizon}; make it with max_episode_steps={horizon}"
+            f"horizon must be at most the {limit} steps after which {name_of(world)} truncates its episodes, "
+            f"got {horizon}; make it with max_episode_steps={horizon}"
         )
 
 

@@ -114,8 +114,8 @@ def _require_picture(artist: Artist, picture: Any, size: Size) -> Picture:
     drawn, shape = np.asarray(picture), (size.height, size.width, 3)
     if drawn.shape != shape or drawn.dtype != np.uint8:
         raise ValueError(
-            f"{type(artist).__name__}.picture must return uint8 of shape {shape}, red, green and blue of each "
-            f"pixel, got {drawn.dtype} of shape {drawn.shape}; workers.simulation.sketch.fit fits any size"
+            f"{type(artist).__name__}.picture must return uint8 of shape {shape}, red, green and blue of "
+            f"each pixel, got {drawn.dtype} of shape {drawn.shape}; workers.simulation.sketch.fit fits it in"
         )
     return drawn
 

@@ -56,7 +56,7 @@ class CartPole(Environment):
     observation = OBSERVATION
     action = ACTION
     control_step = CONTROL_STEP
-    scenery = Sketch(draw, x=(-TRACK - 0.3, TRACK + 0.3), y=(-1.0, 1.4))
+    scenery = Sketch(draw, x=(-TRACK - 1.0, TRACK + 1.0), y=(-1.0, 1.4))
 
     def reset(self, physics: Physics) -> None:
         """At rest in the middle, the pole leaning."""
@@ -97,7 +97,7 @@ class CartPole(Environment):
 
 
 class CarryToTheMark(Task):
-    """f = mean over all steps of 1 less the distance to the mark in m, 0 where that is less or the pole is down."""
+    """f = mean over all steps of 1 less the distance to the mark in m, 0 beyond 1 m and when the pole is down."""
 
     conditions = ("pole_down", "cart_at_the_end")
 

@@ -45,7 +45,7 @@ def apply(environment: gymnasium.Env[Any, Any], physics: Physics) -> None:
 
 
 def distance(observed: Observed, bad: np.ndarray) -> float:  # noqa: ARG001
-    """f = how far it came, in m: the last x before it fell, or of the whole episode."""
+    """F = how far it came, in m: the last x before it fell, or of the whole episode."""
     return float(observed.xi[0, -1])
 
 
@@ -54,15 +54,25 @@ def draw(canvas: Canvas, state: State) -> None:
     canvas.box((2.0, -0.5), size=(20.0, 1.0), color="lightgray")
     for half in range(-10, 21):
         canvas.line([(half / 2, 0.0), (half / 2, -0.08 if half % 2 else -0.16)], width=0.015, color="gray")
-    torso = np.array([state["x"], state["height"]])
-    hip = torso + _turn((0.0, -0.2), angle := state["pitch"])
-    knee = hip + _turn((0.0, -0.45), angle := angle - state["thigh"])
-    ankle = knee + _turn((0.0, -0.5), angle := angle - state["leg"])
-    heel, toe = (ankle + _turn((along, 0.0), angle - state["foot"]) for along in (-0.13, 0.26))
+    head, hip, knee, ankle, heel, toe = skeleton(state)
     canvas.line([heel, toe], width=0.12, color="peru")
     canvas.line([ankle, knee], width=0.08, color="steelblue")
     canvas.line([knee, hip], width=0.1, color="royalblue")
-    canvas.line([hip, torso + _turn((0.0, 0.2), state["pitch"])], width=0.1, color="navy")
+    canvas.line([hip, head], width=0.1, color="navy")
+
+
+def skeleton(state: State) -> list[np.ndarray]:
+    """Head, hip, knee, ankle, heel and toe in the plane, in m."""
+    pitch = state["pitch"]
+    thigh = pitch - state["thigh"]
+    leg = thigh - state["leg"]
+    foot = leg - state["foot"]
+    torso = np.array([state["x"], state["height"]])
+    head, hip = (torso + _turn((0.0, up), pitch) for up in (0.2, -0.2))
+    knee = hip + _turn((0.0, -0.45), thigh)
+    ankle = knee + _turn((0.0, -0.5), leg)
+    heel, toe = (ankle + _turn((along, 0.0), foot) for along in (-0.13, 0.26))
+    return [head, hip, knee, ankle, heel, toe]
 
 
 def _turn(place: tuple[float, float], angle: float) -> np.ndarray:

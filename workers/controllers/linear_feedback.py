@@ -12,8 +12,8 @@ from workers.environments.environment import Channel, Environment
 class LinearFeedback(Controller):
     """u = clip(K o + b): every command is a weighted sum of channels of ξ as they are now, and a constant.
 
-    D = command channels · (channels fed back + 1). o is in the units of ξ, so that a gain is a number that one
-    can picture, such as 30 N/rad.
+    D = command channels · (channels fed back + 1). o is in the units of ξ, so that a gain is a number that
+    one can picture, such as 30 N/rad.
 
     Args:
         observation: the channels of ξ.

@@ -13,8 +13,8 @@ from workers.environments.environment import Channel, Environment
 class Sinusoids(Controller):
     """u_j(t) = c_j + a_j sin(2π v t + φ_j), all command channels at one frequency v, clipped to their bounds.
 
-    D = 1 + 3 · command channels. Amplitudes a and centres c are in the units of the commands; their ranges are
-    shares of half the range of each, about its middle.
+    D = 1 + 3 · command channels. Amplitudes a and centres c are in the units of the commands; their ranges
+    are shares of half the range of each, about its middle.
 
     Args:
         action: the command channels.

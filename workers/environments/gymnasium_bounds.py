@@ -1,14 +1,15 @@
-"""The bounds of ξ for an environment of Gymnasium: its own or given ones, and a proposal where some are missing."""
+"""The bounds of ξ of an environment of Gymnasium: its own, given ones, or else a proposal."""
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from jaxtyping import Float
 
 from workers.environments.environment import Channel
-from workers.environments.gymnasium_world import World, flat_box, name_of
+from workers.environments.gymnasium_world import World, action_box, flat_box, flat_row, name_of
 
 EPISODES = 20
 """So many episodes of random commands show what observations are like."""
@@ -37,7 +38,10 @@ def bounded_channels(
     stated = given or _stated(world.observation_space, box)
     count = math.prod(box.shape)
     if len(stated) != count:
-        problem = f"observation must have a channel for each of the {count} numbers of {name_of(world)}, got {len(stated)}"
+        problem = (
+            f"observation must have a channel for each of the {count} numbers of {name_of(world)}, got "
+            f"{len(stated)}"
+        )
         names = [(f"observation{number}", "") for number in range(1, count + 1)]
         names[: len(stated)] = [(name, unit) for name, unit, _, _ in stated[:count]]
     else:
@@ -49,7 +53,7 @@ def bounded_channels(
     raise ValueError(f"{problem}; {_proposal(names, _extremes(world, action, horizon))}")
 
 
-def _stated(space: spaces.Space, box: spaces.Box) -> list[tuple[str, str, float, float]]:
+def _stated(space: spaces.Space[Any], box: spaces.Box) -> list[tuple[str, str, float, float]]:
     """Name, unit and bounds of every number, as the space has them; units it has none."""
     parts = space.items() if isinstance(space, spaces.Dict) else [("observation", space)]
     names = [
@@ -66,14 +70,14 @@ def _stated(space: spaces.Space, box: spaces.Box) -> list[tuple[str, str, float,
 def _proposal(names: Sequence[tuple[str, str]], seen: Float[np.ndarray, "2 n"]) -> str:
     """Channels to copy: as wide again to either side as what was seen."""
     lines = [
-        f'    Channel("{name}", "{unit}", {low - span:.3g}, {high + span:.3g}),  # seen {low:.3g} to {high:.3g}'
+        f'    Channel("{name}", "{unit}", {low - span:.3g}, {high + span:.3g}),  # saw {low:.3g}, {high:.3g}'
         for (name, unit), low, high in zip(names, *seen.tolist(), strict=True)
         for span in (high - low or 1.0,)
     ]
     return (
-        f"{EPISODES} episodes of random commands propose what is below: name the numbers, give them units, and "
-        "widen their bounds where your controllers reach further, for an episode that leaves them counts as "
-        "exploded\nobservation=(\n" + "\n".join(lines) + "\n)"
+        f"{EPISODES} episodes of random commands propose what is below: name the numbers, give them units, "
+        "and widen their bounds where your controllers reach further, for an episode that leaves them counts "
+        "as exploded\nobservation=(\n" + "\n".join(lines) + "\n)"
     )
 
 
@@ -87,13 +91,13 @@ def _extremes(world: World, action: Sequence[Channel], horizon: int) -> Float[np
 def _random_rows(world: World, action: Sequence[Channel], horizon: int) -> Iterator[np.ndarray]:
     rng = np.random.default_rng(0)
     low, high = ([getattr(channel, bound) for channel in action] for bound in ("low", "high"))
-    space, commands = world.observation_space, world.action_space
+    commands = action_box(world)
     for seed in range(EPISODES):
         seen, _ = world.reset(seed=seed)
-        yield spaces.flatten(space, seen).astype(np.float64)
+        yield flat_row(world, seen)
         for _ in range(horizon):
             command = rng.uniform(low, high).astype(commands.dtype).reshape(commands.shape)
             seen, _, terminated, truncated, _ = world.step(command)
-            yield spaces.flatten(space, seen).astype(np.float64)
+            yield flat_row(world, seen)
             if terminated or truncated:
                 break

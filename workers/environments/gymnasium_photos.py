@@ -14,7 +14,7 @@ from workers.simulation.sketch import fit
 class GymnasiumPhotos(Artist):
     """Puts an environment of its own into each step of ξ, and lets it draw; nothing is simulated.
 
-    So ξ must hold all that is seen. What an environment needs to draw, such as OpenGL or pygame, must be there.
+    So ξ must hold all that is seen. What the environment needs to draw, OpenGL or pygame, must be there.
 
     Args:
         make: makes the environment; it is called with `render_mode="rgb_array"`, as

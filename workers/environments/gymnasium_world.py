@@ -1,7 +1,7 @@
 """An environment that Gymnasium made, as one of ours: flat numbers, finite bounds, nothing left behind."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -120,18 +120,19 @@ class GymnasiumWorld(Environment):
         self._last = self._begin(0)
 
     def reset(self, physics: Physics) -> None:
-        """Renew the environment, put the physics into it, and reset it with the seed of the episode's start."""
+        """Renew the environment, put the physics into it, and reset it with the seed of the start."""
         self._world = self._renew(self._make, self._world)
         self._apply(self._world, physics)
         self._last = self._begin(int(physics.get(START, 0)))
 
     def _begin(self, seed: int) -> GymnasiumRecord:
         """Reset with a seed for all that the environment may draw from."""
-        self._world.action_space.seed(seed)
-        self._world.observation_space.seed(seed)
+        for layer in _layers(self._world):
+            layer.action_space.seed(seed)
+            layer.observation_space.seed(seed)
         seen, info = self._world.reset(seed=seed)
         told = tuple(float(info.get(name, math.nan)) for name in self._info)
-        return GymnasiumRecord(self._row(seen), 0.0, False, False, told)
+        return GymnasiumRecord(self._row(seen), reward=0.0, terminated=False, truncated=False, info=told)
 
     def step(self, command: Sequence[float]) -> GymnasiumRecord:
         """Apply one command; after the end, nothing happens any more."""
@@ -141,9 +142,7 @@ class GymnasiumWorld(Environment):
         action = np.clip(command, self._low, self._high).astype(self._box.dtype).reshape(self._box.shape)
         seen, reward, terminated, truncated, info = self._world.step(action)
         told = tuple(self._number(info, name) for name in self._info)
-        self._last = GymnasiumRecord(
-            self._row(seen), float(reward), bool(terminated), bool(truncated), told
-        )
+        self._last = GymnasiumRecord(self._row(seen), float(reward), bool(terminated), bool(truncated), told)
         return self._last
 
     def _number(self, info: dict[str, Any], name: str) -> float:
@@ -154,7 +153,7 @@ class GymnasiumWorld(Environment):
         return float(info[name])
 
     def _row(self, seen: Any) -> Float64[np.ndarray, " obs"]:
-        return spaces.flatten(self._world.observation_space, seen).astype(np.float64)
+        return flat_row(self._world, seen)
 
     def record(self) -> GymnasiumRecord:
         """What the environment said last."""
@@ -177,6 +176,14 @@ class GymnasiumWorld(Environment):
         self._world.close()
 
 
+def _layers(world: World) -> Iterator[World]:
+    """The environment and all that its wrappers hold; each may have spaces of its own to draw from."""
+    while isinstance(world, gymnasium.Wrapper):
+        yield world
+        world = world.env
+    yield world
+
+
 def name_of(world: World) -> str:
     """Its registered name, or that of its class."""
     return world.spec.id if world.spec else type(world.unwrapped).__name__
@@ -194,7 +201,7 @@ def action_box(world: World) -> spaces.Box:
 
 
 def flat_box(world: World) -> spaces.Box:
-    """The space of its observations as flat numbers; one that does not flatten to a `Box` raises `ValueError`."""
+    """The space of its observations as flat numbers; one that is no `Box` then raises `ValueError`."""
     flat = spaces.flatten_space(world.observation_space)
     if not isinstance(flat, spaces.Box):
         raise ValueError(
@@ -202,6 +209,19 @@ def flat_box(world: World) -> spaces.Box:
             f"{world.observation_space}; wrap it with gymnasium.wrappers.TransformObservation"
         )
     return flat
+
+
+def flat_row(world: World, seen: Any) -> Float64[np.ndarray, " obs"]:
+    """Copy an observation as flat numbers.
+
+    Args:
+        world: the environment.
+        seen: its observation.
+
+    Returns:
+        One number for each place of `flat_box`.
+    """
+    return np.asarray(spaces.flatten(world.observation_space, seen), dtype=np.float64)
 
 
 def _require_count(world: World, what: str, channels: Sequence[Channel], count: int) -> None:

@@ -79,9 +79,7 @@ class Canvas:
         """
         cosine, sine = math.cos(angle), math.sin(angle)
         halves = [(i * size[0] / 2, j * size[1] / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        corners = [
-            (center[0] + a * cosine - b * sine, center[1] + a * sine + b * cosine) for a, b in halves
-        ]
+        corners = [(center[0] + a * cosine - b * sine, center[1] + a * sine + b * cosine) for a, b in halves]
         self.polygon(corners, color=color)
 
     def circle(self, center: Point, *, radius: float, color: Color) -> None:
