@@ -49,12 +49,12 @@ Worth = Callable[[Observed, Bad], float]
 """It leads from an episode, and which of its steps are bad, to f."""
 
 
-def terminated(observed: Observed) -> np.ndarray:
+def has_terminated(observed: Observed) -> np.ndarray:
     """Condition: the environment has terminated; it holds from that step to the horizon."""
     return observed.signals["terminated"]
 
 
-def truncated(observed: Observed) -> np.ndarray:
+def was_truncated(observed: Observed) -> np.ndarray:
     """Condition: the environment has truncated the episode; it holds from that step to the horizon."""
     return observed.signals["truncated"]
 
@@ -83,7 +83,7 @@ class GymnasiumTask(Task):
     def __init__(self, bad: Mapping[str, Condition], objective: Worth) -> None:
         if not bad:
             raise ValueError(
-                'bad must name at least one condition, got none; bad={"fell": terminated} is one that '
+                'bad must name at least one condition, got none; bad={"fell": has_terminated} is one that '
                 "workers.gymnasium_setup offers"
             )
         self.conditions = tuple(bad)
@@ -142,7 +142,7 @@ def gymnasium_setup(
         make: makes the environment; `functools.partial(gymnasium.make, "Hopper-v5")` for one.
         action: name, unit and finite bounds of each number of an action.
         controller: gives one command, a value for each channel of `action`, in every step.
-        bad: G_bad: named conditions; `terminated` is one.
+        bad: G_bad: named conditions; `has_terminated` is one.
         horizon: T, control steps of an episode.
         objective_limits: the objectives that BO sees as 0 and 1.
         success: an episode with f above this succeeded.

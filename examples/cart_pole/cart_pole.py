@@ -97,7 +97,7 @@ class CartPole(Environment):
 
 
 class CarryToTheMark(Task):
-    """f = mean over all steps of 1 less the distance to the mark in m, 0 beyond 1 m and when the pole is down."""
+    """f = mean over all steps of 1 less the metres to the mark, 0 beyond 1 m and with the pole down."""
 
     conditions = ("pole_down", "cart_at_the_end")
 

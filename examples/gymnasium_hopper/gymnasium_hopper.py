@@ -13,7 +13,7 @@ import numpy as np
 
 from workers.controllers.sinusoids import Sinusoids
 from workers.environments.environment import Channel, Observed
-from workers.gymnasium_setup import gymnasium_setup, terminated
+from workers.gymnasium_setup import gymnasium_setup, has_terminated
 from workers.physics import Physics, PhysicsRanges, around
 from workers.setups import Setup
 from workers.simulation.sketch import Canvas, Sketch, State
@@ -97,7 +97,7 @@ def setup() -> Setup:
         action=ACTION,
         observation=OBSERVATION,
         controller=Sinusoids(ACTION, frequency=(1.0, 4.0), amplitude=0.3, center=0.1),
-        bad={"fallen": terminated, "leans": lambda observed: abs(observed.xi[2]) > LEAN},
+        bad={"fallen": has_terminated, "leans": lambda observed: abs(observed.xi[2]) > LEAN},
         horizon=HORIZON,
         objective=distance,
         physics=training,

@@ -9,7 +9,7 @@ import pytest
 from tests.workers.environments.sled import ACTION, OBSERVATION, Sled, vary_mass
 from workers.controllers.waypoints import Waypoints
 from workers.environments.environment import Channel
-from workers.gymnasium_setup import gymnasium_setup, terminated
+from workers.gymnasium_setup import gymnasium_setup, has_terminated
 from workers.physics import PhysicsRanges
 from workers.rollout import random_episode, rollout
 
@@ -22,7 +22,7 @@ def sled_setup(make=Sled, **options):
         "action": ACTION,
         "observation": OBSERVATION,
         "controller": Waypoints(ACTION, 3),
-        "bad": {"over_the_fence": terminated, "fast": lambda observed: abs(observed.xi[1]) > 0.5},
+        "bad": {"over_the_fence": has_terminated, "fast": lambda observed: abs(observed.xi[1]) > 0.5},
         "horizon": 40,
         "objective_limits": (-40.0, 0.0),
         "success": -10.0,

@@ -35,7 +35,7 @@ def bounded_channels(
     """
     box = flat_box(world)
     given = [(each.name, each.unit, each.low, each.high) for each in observation]
-    stated = given or _stated(world.observation_space, box)
+    stated = given or _own_bounds(world.observation_space, box)
     count = math.prod(box.shape)
     if len(stated) != count:
         problem = (
@@ -53,7 +53,7 @@ def bounded_channels(
     raise ValueError(f"{problem}; {_proposal(names, _extremes(world, action, horizon))}")
 
 
-def _stated(space: spaces.Space[Any], box: spaces.Box) -> list[tuple[str, str, float, float]]:
+def _own_bounds(space: spaces.Space[Any], box: spaces.Box) -> list[tuple[str, str, float, float]]:
     """Name, unit and bounds of every number, as the space has them; units it has none."""
     parts = space.items() if isinstance(space, spaces.Dict) else [("observation", space)]
     names = [

@@ -57,7 +57,12 @@ def keep(make: Make, used: World) -> World:  # noqa: ARG001
 
 
 def nothing_to_apply(environment: World, physics: Physics) -> None:
-    """Of environments without physics parameters, but for `start`."""
+    """Of environments without physics parameters, but for `start`.
+
+    Args:
+        environment: not changed.
+        physics: not looked at.
+    """
 
 
 class GymnasiumRecord(NamedTuple):
