@@ -61,7 +61,9 @@ class LinearFeedback(Controller):
 
         def command(_: int) -> Sequence[float]:
             seen = environment.observed([environment.record()]).xi[rows, 0].astype(np.float64)
-            return np.clip(gains @ seen + bias, low, high).tolist()
+            return np.minimum(
+                np.maximum(gains @ seen + bias, low), high
+            ).tolist()  # np.clip takes twice as long
 
         return command
 

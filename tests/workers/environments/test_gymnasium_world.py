@@ -141,3 +141,23 @@ def test_spaces_that_are_no_boxes_are_refused_with_a_remedy():
 def test_too_few_channels_are_refused_by_their_names(which):
     with pytest.raises(ValueError, match=rf"{which} must have a channel for each of the .* of Sled, got 0"):
         opened(**{which: ()})
+
+
+def test_a_simulation_of_mujoco_that_explodes_is_seen_and_not_set_back_to_its_start(monkeypatch, tmp_path):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log there
+
+    def make():
+        return gymnasium.make("Hopper-v5", disable_env_checker=True, terminate_when_unhealthy=False)
+
+    def apply(environment, physics):
+        environment.unwrapped.model.actuator_gear[:] = physics["gear"]
+
+    world = opened(
+        make,
+        observation=[Channel(f"o{number}", "1", -100.0, 100.0) for number in range(11)],
+        action=[Channel(f"a{number}", "1", -1.0, 1.0) for number in range(3)],
+        apply=apply,
+    )
+    assert np.isfinite(run(world, {"gear": 200.0}, [[1.0] * 3] * 5).xi).all()
+    assert not np.isfinite(run(world, {"gear": 1e12}, [[1.0] * 3] * 5).xi[:, -1]).any()
