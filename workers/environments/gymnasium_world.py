@@ -192,7 +192,7 @@ def _layers(world: World) -> Iterator[World]:
 
 
 def _let_explode(world: World) -> None:
-    """MuJoCo sets a simulation that explodes back to its start and goes on: keep it from that, for ξ to tell."""
+    """MuJoCo sets a simulation that explodes back to its start and goes on: keep it from that."""
     model: Any = getattr(world.unwrapped, "model", None)
     if type(model).__module__.partition(".")[0] == "mujoco":
         import mujoco
