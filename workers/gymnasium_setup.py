@@ -27,6 +27,7 @@ from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Observed
 from workers.environments.gymnasium_bounds import bounded_channels
 from workers.environments.gymnasium_world import (
+    START,
     Apply,
     GymnasiumWorld,
     Make,
@@ -36,6 +37,7 @@ from workers.environments.gymnasium_world import (
     make_anew,
     name_of,
     nothing_to_apply,
+    require_channels,
 )
 from workers.physics import PhysicsRanges
 from workers.setups.setup import Setup
@@ -164,11 +166,11 @@ def gymnasium_setup(
         ValueError: the environment and what is said of it do not go together; the message tells how to.
     """
     ranges = PhysicsRanges({}) if physics is None else physics
+    _require_effect(ranges, apply)
     world = make()
     try:
         name = name_of(world)
-        _require_bounded(action, name)
-        action_box(world)
+        _require_within(world, action)
         seconds = _control_step(world) if control_step is None else control_step
         _require_time(world, horizon)
         channels = bounded_channels(world, observation, action, horizon)
@@ -199,13 +201,26 @@ def gymnasium_setup(
     )
 
 
-def _require_bounded(action: Sequence[Channel], name: str) -> None:
-    for channel in action:
-        if not math.isfinite(channel.high - channel.low):
+def _require_within(world: World, action: Sequence[Channel]) -> None:
+    """Refuse commands that the environment does not take; 0.7 is within a float32's 0.7."""
+    box = action_box(world)
+    require_channels(world, "action", action, math.prod(box.shape))
+    for channel, low, high in zip(action, box.low.flat, box.high.flat, strict=True):
+        least, most = box.dtype.type(channel.low), box.dtype.type(channel.high)
+        if not (math.isfinite(most - least) and low <= least and most <= high):
             raise ValueError(
-                f"bounds of the command {channel.name} of {name} must be finite, got "
-                f"[{channel.low}, {channel.high}]; give those of the motor"
+                f"bounds of the command {channel.name} must be finite and within [{low:g}, {high:g}], those "
+                f"of {name_of(world)}, got [{channel.low:g}, {channel.high:g}]"
             )
+
+
+def _require_effect(ranges: PhysicsRanges, apply: Apply) -> None:
+    idle = sorted(ranges.intervals.keys() - {START})
+    if idle and apply is nothing_to_apply:
+        raise ValueError(
+            f"physics has {', '.join(idle)}, and nothing puts that into the environment; give apply, a "
+            "function of the environment and the physics of an episode"
+        )
 
 
 def _require_time(world: World, horizon: int) -> None:

@@ -1,16 +1,19 @@
 """An environment of Gymnasium as a setup: what is taken from it, what must be said, and its episodes."""
 
 from functools import partial
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 from tests.workers.environments.sled import ACTION, OBSERVATION, Sled, vary_mass
 from workers.controllers.waypoints import Waypoints
 from workers.environments.environment import Channel
 from workers.gymnasium_setup import gymnasium_setup, has_terminated
 from workers.physics import PhysicsRanges
+from workers.pictures import Size, frames
 from workers.rollout import random_episode, rollout
 
 PENDULUM = partial(gymnasium.make, "Pendulum-v1", disable_env_checker=True)
@@ -128,3 +131,44 @@ def test_a_step_of_unknown_length_must_be_told():
 def test_conditions_that_are_none_are_refused_by_name(bad, message):
     with pytest.raises(ValueError, match=message):
         episode_of(sled_setup(bad=bad), [0.5, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("bounds", [(-1.5, 1.0), (-1.0, 1.5), (-np.inf, 1.0)])
+def test_commands_that_the_environment_does_not_take_are_refused_by_name(bounds):
+    with pytest.raises(ValueError, match=r"force must be finite and within \[-1, 1\], those of Sled, got \["):
+        sled_setup(action=(Channel("force", "N", *bounds),))
+
+
+def test_bounds_that_the_environment_has_in_float32_are_taken_in_decimals():
+    class Weak(Sled):
+        def __init__(self):
+            super().__init__()
+            self.action_space = spaces.Box(-0.7, 0.7, (1,), np.float32)
+
+    assert sled_setup(Weak, action=(Channel("force", "N", -0.7, 0.7),)).dimensions == 3
+
+
+def test_too_many_commands_are_refused_before_bounds_are_proposed():
+    with pytest.raises(
+        ValueError, match="action must have a channel for each of the 1 numbers of Sled, got 2"
+    ):
+        sled_setup(action=ACTION * 2, observation=())
+
+
+def test_physics_that_nothing_applies_is_refused_but_for_the_start():
+    with pytest.raises(ValueError, match="physics has mass, and nothing puts that into the environment"):
+        sled_setup(physics=PhysicsRanges({"mass": (0.5, 2.0), "start": (0.0, 9.0)}))
+    assert sled_setup(physics=PhysicsRanges({"start": (0.0, 9.0)})).physics.intervals.keys() == {"start"}
+
+
+def test_the_setup_of_the_documentation_runs_and_is_drawn():
+    page = (Path(__file__).parents[2] / "docs" / "gymnasium.md").read_text(encoding="utf-8")
+    module = {}
+    exec(page.split("```python\n")[1].split("```")[0], module)
+    setup = module["setup"]()
+    with setup.open() as environment:
+        one, other = (random_episode(setup, environment, 0, index) for index in range(2))
+    assert one.f != other.f
+    assert 0.0 < one.y < 1.0
+    first, last = frames(setup, one.xi, [0, 199], Size(64, 48))
+    assert (first != last).any()

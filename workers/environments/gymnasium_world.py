@@ -120,8 +120,8 @@ class GymnasiumWorld(Environment):
         self._high = np.array([channel.high for channel in action])
         self._world = make()
         self._box = action_box(self._world)
-        _require_count(self._world, "action", self.action, math.prod(self._box.shape))
-        _require_count(self._world, "observation", self.observation, math.prod(flat_box(self._world).shape))
+        require_channels(self._world, "action", self.action, math.prod(self._box.shape))
+        require_channels(self._world, "observation", self.observation, math.prod(flat_box(self._world).shape))
         self._last = self._begin(0)
 
     def reset(self, physics: Physics) -> None:
@@ -240,7 +240,18 @@ def flat_row(world: World, seen: Any) -> Float64[np.ndarray, " obs"]:
     return np.asarray(spaces.flatten(world.observation_space, seen), dtype=np.float64)
 
 
-def _require_count(world: World, what: str, channels: Sequence[Channel], count: int) -> None:
+def require_channels(world: World, what: str, channels: Sequence[Channel], count: int) -> None:
+    """Refuse more or fewer channels than there are numbers.
+
+    Args:
+        world: the environment, for the error.
+        what: the channels are of, `action` or `observation`.
+        channels: as they are given.
+        count: of the numbers.
+
+    Raises:
+        ValueError: naming the channels.
+    """
     if len(channels) != count:
         raise ValueError(
             f"{what} must have a channel for each of the {count} numbers of {name_of(world)}, got "
