@@ -44,6 +44,7 @@ from workers.setups.setup import Setup
 from workers.simulation.artist import Artist
 from workers.simulation.scenery import Scenery
 from workers.tasks.task import Bad, Task
+from workers.user_code import UserCodeError
 
 Condition = Callable[[Observed], np.ndarray]
 """It leads from an episode to one boolean per step: whether the condition holds, [T]."""
@@ -84,7 +85,7 @@ class GymnasiumTask(Task):
 
     def __init__(self, bad: Mapping[str, Condition], objective: Worth) -> None:
         if not bad:
-            raise ValueError(
+            raise UserCodeError(
                 'bad must name at least one condition, got none; bad={"fell": has_terminated} is one that '
                 "workers.gymnasium_setup offers"
             )
@@ -112,7 +113,7 @@ class GymnasiumTask(Task):
 def _holds(name: str, condition: Condition, observed: Observed) -> np.ndarray:
     row, steps = np.asarray(condition(observed)), observed.xi.shape[1]
     if row.shape != (steps,) or row.dtype != np.bool_:
-        raise ValueError(
+        raise UserCodeError(
             f"the bad condition {name!r} must return one boolean per step, bool of shape ({steps},), got "
             f"{row.dtype} of shape {row.shape}"
         )
@@ -163,7 +164,7 @@ def gymnasium_setup(
         The setup, named after the environment.
 
     Raises:
-        ValueError: the environment and what is said of it do not go together; the message tells how to.
+        UserCodeError: the environment and what is said of it do not go together; the message tells how to.
     """
     ranges = PhysicsRanges({}) if physics is None else physics
     _require_effect(ranges, apply)
@@ -207,17 +208,17 @@ def _require_within(world: World, action: Sequence[Channel]) -> None:
     require_channels(world, "action", action, math.prod(box.shape))
     for channel, low, high in zip(action, box.low.flat, box.high.flat, strict=True):
         least, most = box.dtype.type(channel.low), box.dtype.type(channel.high)
-        if not (math.isfinite(most - least) and low <= least and most <= high):
-            raise ValueError(
-                f"bounds of the command {channel.name} must be finite and within [{low:g}, {high:g}], those "
-                f"of {name_of(world)}, got [{channel.low:g}, {channel.high:g}]"
+        if not (low <= least and most <= high):
+            raise UserCodeError(
+                f"bounds of the command {channel.name} must lie within [{low:g}, {high:g}], those of "
+                f"{name_of(world)}, got [{channel.low:g}, {channel.high:g}]"
             )
 
 
 def _require_effect(ranges: PhysicsRanges, apply: Apply) -> None:
     idle = sorted(ranges.intervals.keys() - {START})
     if idle and apply is nothing_to_apply:
-        raise ValueError(
+        raise UserCodeError(
             f"physics has {', '.join(idle)}, and nothing puts that into the environment; give apply, a "
             "function of the environment and the physics of an episode"
         )
@@ -227,7 +228,7 @@ def _require_time(world: World, horizon: int) -> None:
     """Refuse a horizon that a time limit of the environment cuts short."""
     limit = world.spec.max_episode_steps if world.spec else None
     if limit is not None and horizon > limit:
-        raise ValueError(
+        raise UserCodeError(
             f"horizon must be at most the {limit} steps after which {name_of(world)} truncates its episodes, "
             f"got {horizon}; make it with max_episode_steps={horizon}"
         )
@@ -236,5 +237,5 @@ def _require_time(world: World, horizon: int) -> None:
 def _control_step(world: World) -> float:
     step = getattr(world.unwrapped, "dt", None)
     if step is None:
-        raise ValueError(f"{name_of(world)} does not say how long a step is; give control_step, in s")
+        raise UserCodeError(f"{name_of(world)} does not say how long a step is; give control_step, in s")
     return float(step)

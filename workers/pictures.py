@@ -28,6 +28,7 @@ from workers.simulation import shapes
 from workers.simulation.artist import Artist
 from workers.simulation.scenery import POSE_CHANNELS, Machine, Roll, Scenery, Vector
 from workers.simulation.stage import Scene
+from workers.user_code import UserCodeError
 
 REACH = 32  # tiles of the ground drawn around every point the camera looks at
 CALM = 1.0  # s, over which a camera that follows takes the mean of the positions
@@ -113,7 +114,7 @@ def _artist_frames(
 def _require_picture(artist: Artist, picture: Any, size: Size) -> Picture:
     drawn, shape = np.asarray(picture), (size.height, size.width, 3)
     if drawn.shape != shape or drawn.dtype != np.uint8:
-        raise ValueError(
+        raise UserCodeError(
             f"{type(artist).__name__}.picture must return uint8 of shape {shape}, red, green and blue of "
             f"each pixel, got {drawn.dtype} of shape {drawn.shape}; workers.simulation.sketch.fit fits it in"
         )

@@ -11,11 +11,10 @@ from cluster.errors import UserError
 from cluster.progress import duration, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
-from workers.collection.forecast import forecast
+from workers.collection.forecast import forecast, pilot_of
 from workers.dataset.folder import Dataset
-
-PILOT_SHARDS = 4
-"""A plan rolls out that many shards, or two on every actor if that is more."""
+from workers.dataset.notes import notes
+from workers.dataset.storage.presence import others_at_work, presence
 
 
 def collect(
@@ -46,9 +45,11 @@ def collect(
         return dataset
     actors = min(settings.actor_count(session.cpus), len(missing))
     session.preflight(actors)
-    with tracker.run(
-        f"collect {dataset.identity.setup}", "collect", plan.parameters(actors, settings)
-    ) as run:
+    warn_of_others(dataset)
+    with (
+        presence(dataset.folder),
+        tracker.run(f"collect {dataset.identity.setup}", "collect", plan.parameters(actors, settings)) as run,
+    ):
         counts = CollectionProgress(planned=episodes_in(missing))
         pool = rollout_pool(dataset, settings, actors, actor, growth(settings))
         try:
@@ -75,14 +76,18 @@ def collect_pilot(
     """
     dataset, missing = plan.dataset, plan.missing
     actors = min(settings.actor_count(session.cpus), len(missing))
-    pilot = missing[: max(PILOT_SHARDS, 2 * actors)]
+    pilot = pilot_of(missing, actors)
     if len(pilot) < 2:
         raise UserError(
             f"{episodes_in(missing)} episodes are left to collect in {dataset.folder}: too few to plan for; "
             "leave out --plan"
         )
     session.preflight(actors)
-    with tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run:
+    warn_of_others(dataset)
+    with (
+        presence(dataset.folder),
+        tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run,
+    ):
         counts = CollectionProgress(planned=episodes_in(pilot))
         reports = roll_out(plan, pilot, counts, run, rollout_pool(dataset, settings, actors))
         if len(reports) < 2:
@@ -96,6 +101,15 @@ def collect_pilot(
         run.metrics(counts.metrics() | metrics(expected), step=counts.episodes)
 
 
+def warn_of_others(dataset: Dataset) -> None:
+    """Say that another command collects into the same folder: what both roll out is kept once."""
+    for path in others_at_work(dataset.folder):
+        say(
+            f"warning: another collection is at work in {dataset.folder}: what both roll out is kept once, "
+            f"so this one may find little to do. If there is none any more, remove {path}"
+        )
+
+
 def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
     """Say first how it went: the store may fail."""
     dataset = plan.dataset
@@ -105,8 +119,10 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
         f"{counts.episodes} new in {duration(counts.seconds)} "
         f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
-        f"{counts.stopped} stopped, {counts.retries} retries; {run.url}"
+        f"{counts.stopped} stopped, {counts.failed_text}{counts.retries} retries; {run.url}"
     )
+    for note in notes(dataset):
+        say(f"note: {note}")
     run.metrics(counts.metrics() | review(dataset), step=counts.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
     left = quarantined_shards(dataset, plan.episodes)

@@ -22,7 +22,8 @@ TRACK = 2.4  # m to either side, where the cart is held up
 MARK = 1.0  # m
 LEAN = 0.15  # rad to the right, at first
 FALLEN = 0.5  # rad
-NOMINAL = {"pole_mass": 0.1, "pole_length": 1.0, "friction": 0.5}  # kg, m, N·s/m
+NOMINAL = {"pole_mass": 0.1, "pole_length": 1.0, "friction": 0.5, "slope": 0.0}  # kg, m, N·s/m, rad upwards
+SLOPE = (-0.02, 0.02)  # rad of the track, to either side
 CONTROL_STEP = 0.02  # s
 SUBSTEPS = 4
 HORIZON = 250  # control steps
@@ -51,7 +52,7 @@ def draw(canvas: Canvas, state: State) -> None:
 
 
 class CartPole(Environment):
-    """The cart and its pole; a command is the force on the cart."""
+    """The cart and its pole, which leans from the normal of the track; a command is the force on the cart."""
 
     observation = OBSERVATION
     action = ACTION
@@ -63,6 +64,7 @@ class CartPole(Environment):
         self._mass = physics["pole_mass"]
         self._half = physics["pole_length"] / 2
         self._friction = physics["friction"]
+        self._pull = -GRAVITY * math.sin(physics["slope"])
         self._x, self._v, self._lean, self._turn = 0.0, 0.0, LEAN, 0.0
 
     def step(self, command: Sequence[float]) -> tuple[float, ...]:
@@ -72,12 +74,12 @@ class CartPole(Environment):
         return self.record()
 
     def _move(self, force: float, dt: float) -> None:
-        """Barto, Sutton and Anderson (1983), with friction of the cart."""
+        """Barto, Sutton and Anderson (1983), with friction of the cart and a slight slope, which pulls on both."""
         sine, cosine = math.sin(self._lean), math.cos(self._lean)
         mass, moment = CART_MASS + self._mass, self._mass * self._half
         push = (force - self._friction * self._v + moment * self._turn**2 * sine) / mass
         bend = (GRAVITY * sine - cosine * push) / (self._half * (4 / 3 - self._mass * cosine**2 / mass))
-        self._v += dt * (push - moment * bend * cosine / mass)
+        self._v += dt * (push + self._pull - moment * bend * cosine / mass)
         self._turn += dt * bend
         self._x += dt * self._v
         self._lean += dt * self._turn
@@ -114,7 +116,7 @@ class CarryToTheMark(Task):
 
 def setup() -> Setup:
     """What `--setup cart_pole` loads."""
-    training = around(NOMINAL, 0.2)
+    training = PhysicsRanges({**around(NOMINAL, 0.2).intervals, "slope": SLOPE})
     fixed = {name: (value, value) for name, value in NOMINAL.items()}
     return Setup(
         name="cart_pole",
@@ -138,7 +140,7 @@ def setup() -> Setup:
         gaps={
             "paper": PhysicsRanges(fixed | {"pole_length": training.intervals["pole_length"]}),
             "training": training,
-            "wide": around(NOMINAL, 0.5),
+            "wide": PhysicsRanges({**around(NOMINAL, 0.5).intervals, "slope": (-0.05, 0.05)}),
         },
         objective_limits=(0.0, 1.0),
         success=0.5,

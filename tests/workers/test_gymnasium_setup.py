@@ -133,9 +133,9 @@ def test_conditions_that_are_none_are_refused_by_name(bad, message):
         episode_of(sled_setup(bad=bad), [0.5, 0.5, 0.5])
 
 
-@pytest.mark.parametrize("bounds", [(-1.5, 1.0), (-1.0, 1.5), (-np.inf, 1.0)])
+@pytest.mark.parametrize("bounds", [(-1.5, 1.0), (-1.0, 1.5)])
 def test_commands_that_the_environment_does_not_take_are_refused_by_name(bounds):
-    with pytest.raises(ValueError, match=r"force must be finite and within \[-1, 1\], those of Sled, got \["):
+    with pytest.raises(ValueError, match=r"force must lie within \[-1, 1\], those of Sled, got \["):
         sled_setup(action=(Channel("force", "N", *bounds),))
 
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from workers.environments.environment import Channel
 from workers.environments.gymnasium_world import World, action_box, flat_box, flat_row, name_of
+from workers.user_code import UserCodeError
 
 EPISODES = 20
 """So many episodes of random commands show what observations are like."""
@@ -30,7 +31,7 @@ def bounded_channels(
         One channel per number.
 
     Raises:
-        ValueError: there are more or fewer channels than numbers, or bounds are not finite; the message
+        UserCodeError: there are more or fewer channels than numbers, or bounds are not finite; the message
             proposes channels that go by what 20 episodes of random commands showed.
     """
     box = flat_box(world)
@@ -50,7 +51,7 @@ def bounded_channels(
             return tuple(Channel(*each) for each in stated)
         problem = f"{name_of(world)} has no finite bounds of {', '.join(unbounded)}, and ξ needs some"
         names = [(name, unit) for name, unit, _, _ in stated]
-    raise ValueError(f"{problem}; {_proposal(names, _extremes(world, action, horizon))}")
+    raise UserCodeError(f"{problem}; {_proposal(names, _extremes(world, action, horizon))}")
 
 
 def _own_bounds(space: spaces.Space[Any], box: spaces.Box) -> list[tuple[str, str, float, float]]:

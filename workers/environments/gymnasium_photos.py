@@ -9,6 +9,7 @@ from jaxtyping import UInt8
 from workers.environments.gymnasium_world import World, name_of
 from workers.simulation.artist import Artist, State
 from workers.simulation.sketch import fit
+from workers.user_code import UserCodeError
 
 
 class GymnasiumPhotos(Artist):
@@ -39,7 +40,7 @@ class GymnasiumPhotos(Artist):
             Red, green and blue, from the top left, [height, width, 3].
 
         Raises:
-            ValueError: the environment draws no such picture.
+            UserCodeError: the environment draws no such picture.
         """
         if self._world is None:
             self._world = self._make(render_mode="rgb_array")
@@ -47,7 +48,7 @@ class GymnasiumPhotos(Artist):
         self._pose(self._world, state)
         drawn: Any = np.asarray(self._world.render())
         if drawn.ndim != 3 or drawn.shape[2] != 3 or drawn.dtype != np.uint8:
-            raise ValueError(
+            raise UserCodeError(
                 f"render() of {name_of(self._world)} must return uint8 [height, width, 3], got {drawn.dtype} "
                 f"of shape {drawn.shape}; draw it with workers.simulation.sketch.Sketch instead"
             )

@@ -13,6 +13,7 @@ from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics
 from workers.simulation.artist import Artist
 from workers.simulation.scenery import Scenery
+from workers.user_code import UserCodeError
 
 World = gymnasium.Env[Any, Any]
 Make = Callable[[], World]
@@ -93,7 +94,7 @@ class GymnasiumWorld(Environment):
         scenery: what pictures show.
 
     Raises:
-        ValueError: its spaces are no boxes, or there are more or fewer channels than numbers.
+        UserCodeError: its spaces are no boxes, or there are more or fewer channels than numbers.
     """
 
     def __init__(
@@ -154,7 +155,7 @@ class GymnasiumWorld(Environment):
 
     def _number(self, info: dict[str, Any], name: str) -> float:
         if name not in info:
-            raise ValueError(
+            raise UserCodeError(
                 f"info of {name_of(self._world)} has no {name!r}; it has {', '.join(info) or 'nothing'}"
             )
         return float(info[name])
@@ -206,10 +207,10 @@ def name_of(world: World) -> str:
 
 
 def action_box(world: World) -> spaces.Box:
-    """The space of its actions; one that is no `Box` raises `ValueError`."""
+    """The space of its actions; one that is no `Box` raises `UserCodeError`."""
     space = world.action_space
     if not isinstance(space, spaces.Box):
-        raise ValueError(
+        raise UserCodeError(
             f"the action space of {name_of(world)} must be a Box of real numbers, got {space}; a controller "
             "gives numbers: wrap it with gymnasium.wrappers.TransformAction, or take a continuous variant"
         )
@@ -217,10 +218,10 @@ def action_box(world: World) -> spaces.Box:
 
 
 def flat_box(world: World) -> spaces.Box:
-    """The space of its observations as flat numbers; one that is no `Box` then raises `ValueError`."""
+    """The space of its observations as flat numbers; one that is no `Box` then raises `UserCodeError`."""
     flat = spaces.flatten_space(world.observation_space)
     if not isinstance(flat, spaces.Box):
-        raise ValueError(
+        raise UserCodeError(
             f"the observation space of {name_of(world)} must be a Box, or a Dict of boxes, got "
             f"{world.observation_space}; wrap it with gymnasium.wrappers.TransformObservation"
         )
@@ -250,10 +251,10 @@ def require_channels(world: World, what: str, channels: Sequence[Channel], count
         count: of the numbers.
 
     Raises:
-        ValueError: naming the channels.
+        UserCodeError: naming the channels.
     """
     if len(channels) != count:
-        raise ValueError(
+        raise UserCodeError(
             f"{what} must have a channel for each of the {count} numbers of {name_of(world)}, got "
             f"{len(channels)}: {', '.join(channel.name for channel in channels)}"
         )
