@@ -74,7 +74,7 @@ class CartPole(Environment):
         return self.record()
 
     def _move(self, force: float, dt: float) -> None:
-        """Barto, Sutton and Anderson (1983), with friction of the cart and a slight slope, which pulls on both."""
+        """Barto, Sutton and Anderson (1983), with friction of the cart and a slight slope."""
         sine, cosine = math.sin(self._lean), math.cos(self._lean)
         mass, moment = CART_MASS + self._mass, self._mass * self._half
         push = (force - self._friction * self._v + moment * self._turn**2 * sine) / mass
