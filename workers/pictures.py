@@ -1,4 +1,4 @@
-"""Pictures of a trajectory: a scene is put into the states that ξ holds, one after the other.
+"""Pictures of a trajectory: a scene is put into the states that ξ holds, or an artist draws them, one by one.
 
 Nothing is simulated, and ξ is all that is needed: of an episode, from a dataset, or out of a model. The scene
 is apart from that of the rollouts, which load nothing that is only seen.
@@ -14,7 +14,9 @@ Example:
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -23,8 +25,10 @@ from scipy.spatial.transform import Rotation
 from workers.environments.environment import Channel
 from workers.setups import Setup
 from workers.simulation import shapes
+from workers.simulation.artist import Artist
 from workers.simulation.scenery import POSE_CHANNELS, Machine, Roll, Scenery, Vector
 from workers.simulation.stage import Scene
+from workers.user_code import UserCodeError
 
 REACH = 32  # tiles of the ground drawn around every point the camera looks at
 CALM = 1.0  # s, over which a camera that follows takes the mean of the positions
@@ -35,6 +39,8 @@ _UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 _UNIT = np.eye(3)
 _SMALL = 1e-3  # length below which a column of a rotation matrix has no direction
 
+Trajectory = Float32[np.ndarray, "obs time"]
+Picture = UInt8[np.ndarray, "height width 3"]
 Pose = tuple[Float[np.ndarray, "3"], list[float]]
 """It is a position in m, [3], and an orientation as a quaternion (x, y, z, w)."""
 
@@ -77,6 +83,15 @@ def frames(
             f"got shape {xi.shape} with {np.count_nonzero(~np.isfinite(xi))} that are not finite"
         )
     scenery = scenery_of(setup)
+    if isinstance(scenery, Scenery):
+        yield from _staged_frames(scenery, setup, xi, steps, size)
+    else:
+        yield from _artist_frames(scenery, setup, xi, steps, size)
+
+
+def _staged_frames(
+    scenery: Scenery, setup: Setup, xi: Trajectory, steps: Sequence[int], size: Size
+) -> Iterator[Picture]:
     with Scene() as stage:
         show = Show(stage, scenery, setup.observation)
         targets = show.targets(xi, setup.control_step)
@@ -86,7 +101,27 @@ def frames(
             yield stage.picture(scenery.camera, size.width, size.height)
 
 
-def scenery_of(setup: Setup) -> Scenery:
+def _artist_frames(
+    artist: Artist, setup: Setup, xi: Trajectory, steps: Sequence[int], size: Size
+) -> Iterator[Picture]:
+    names = [channel.name for channel in setup.observation]
+    with closing(artist):
+        for step in steps:
+            state = dict(zip(names, xi[:, step].tolist(), strict=True))
+            yield _require_picture(artist, artist.picture(state, size.width, size.height), size)
+
+
+def _require_picture(artist: Artist, picture: Any, size: Size) -> Picture:
+    drawn, shape = np.asarray(picture), (size.height, size.width, 3)
+    if drawn.shape != shape or drawn.dtype != np.uint8:
+        raise UserCodeError(
+            f"{type(artist).__name__}.picture must return uint8 of shape {shape}, red, green and blue of "
+            f"each pixel, got {drawn.dtype} of shape {drawn.shape}; workers.simulation.sketch.fit fits it in"
+        )
+    return drawn
+
+
+def scenery_of(setup: Setup) -> Scenery | Artist:
     """What pictures of a setup show; a setup without anything to see raises `LookupError`."""
     with setup.open() as environment:
         scenery = environment.scenery

@@ -16,6 +16,7 @@ from workers.setups import Setup
 from workers.simulation.bullet import pybullet
 from workers.simulation.cylinder import Cylinder
 from workers.simulation.description import joint_indices, load_robot
+from workers.simulation.sketch import Canvas, Sketch, State
 from workers.simulation.world import World
 from workers.tasks.task import Task
 
@@ -24,8 +25,10 @@ JOINTS = ("shoulder", "elbow")
 HOME = (-1.0, 0.6)  # rad
 EFFORT = 5.0  # N·m of each motor
 SPEED = 2.0  # rad/s, the fastest command
-REACH = 0.5  # m
+LINK = 0.25  # m, each of two
+REACH = 2 * LINK
 PUCK = (0.38, 0.0)  # m, where it stands at first
+PUCK_RADIUS = 0.04  # m
 NOMINAL = {"puck_mass": 0.2, "puck_friction": 0.4}  # kg, and a coefficient
 CONTROL_STEP = 0.01  # s
 SUBSTEPS = 2
@@ -39,12 +42,23 @@ OBSERVATION = (
 ACTION = tuple(Channel(name, "rad/s", -SPEED, SPEED) for name in JOINTS)
 
 
+def draw(canvas: Canvas, state: State) -> None:
+    """From above: how far the arm reaches, the puck, and both links."""
+    canvas.circle((0.0, 0.0), radius=REACH, color="gainsboro")
+    canvas.circle((state["puck_x"], state["puck_y"]), radius=PUCK_RADIUS, color="peru")
+    angles = np.cumsum([state[name] for name in JOINTS])
+    ends = np.cumsum(LINK * np.stack([np.cos(angles), np.sin(angles)], axis=1), axis=0)
+    canvas.line([(0.0, 0.0), *ends], width=0.03, color="steelblue")
+    canvas.circle((0.0, 0.0), radius=0.03, color="navy")
+
+
 class Pusher(Environment):
     """The arm and its puck on the plane z = 0; a command is the speed of both joints."""
 
     observation = OBSERVATION
     action = ACTION
     control_step = CONTROL_STEP
+    scenery = Sketch(draw, x=(-0.6, 0.7), y=(-0.6, 0.6))
 
     def __init__(self) -> None:
         self._world = World(time_step=CONTROL_STEP / SUBSTEPS, solver_iterations=20)
@@ -52,7 +66,7 @@ class Pusher(Environment):
         self._arm = load_robot(URDF, self._client, useFixedBase=True)
         index = joint_indices(self._arm, self._client, URDF, JOINTS)
         self._joints = [index[name] for name in JOINTS]
-        self._puck = Cylinder(self._world, radius=0.04, height=0.06, position=PUCK)
+        self._puck = Cylinder(self._world, radius=PUCK_RADIUS, height=0.06, position=PUCK)
 
     def reset(self, physics: Physics) -> None:
         """Everything back to its start, and old contacts forgotten: no episode depends on those before."""

@@ -1,4 +1,4 @@
-"""Every setup that ships and the example of a user's own, with a few short episodes of each."""
+"""Every setup that ships and the examples of users' own, with a few short episodes of each."""
 
 import os
 from dataclasses import replace
@@ -9,16 +9,21 @@ import pytest
 from workers import setups
 from workers.rollout import Episode, random_episode
 
-EXAMPLE = str(Path(__file__).parents[2] / "examples" / "two_link_pusher")
+FOLDER = Path(__file__).parents[2] / "examples"
+EXAMPLES = ("two_link_pusher", "cart_pole", "gymnasium_hopper")
 SHORT = 300  # control steps; whole episodes run in the slow tests
 
 
-@pytest.fixture(scope="module", params=[*sorted(setups.SETUPS), "two_link_pusher"])
+@pytest.fixture(scope="module", params=[*sorted(setups.SETUPS), *EXAMPLES])
 def whole(request):
-    """A setup that ships, or the example of a user's own, found as a user's would be."""
+    """A setup that ships, or an example of a user's own, found as a user's would be."""
+    if request.param == "gymnasium_hopper":
+        pytest.importorskip("mujoco")
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(EXAMPLE)
-        patch.setenv("PYTHONPATH", f"{EXAMPLE}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+        if request.param in EXAMPLES:
+            folder = str(FOLDER / request.param)
+            patch.syspath_prepend(folder)
+            patch.setenv("PYTHONPATH", f"{folder}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
         yield setups.load(request.param)
 
 

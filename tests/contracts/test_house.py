@@ -19,7 +19,8 @@ IRREGULAR = frozenset(
     {"found", "begun", "known", "told", "drawn", "held", "lost", "spent", "given", "done", "made"}
 )
 KEPT = frozenset(
-    {"Environment.observed", "Daisy.observed", "Point.observed", "Tabletop.observed", "Outcome.found"}
+    {f"{name}.observed" for name in ("Environment", "Daisy", "GymnasiumWorld", "Point", "Tabletop")}
+    | {"Outcome.found"}
 )
 """What users' own environments implement keeps its name."""
 

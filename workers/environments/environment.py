@@ -11,6 +11,7 @@ from jaxtyping import Float32
 
 from workers import plain
 from workers.physics import Physics
+from workers.simulation.artist import Artist
 from workers.simulation.scenery import Scenery
 from workers.user_code import UserCodeError
 
@@ -123,13 +124,13 @@ class Environment(ABC):
         observation: the channels of ξ, in order.
         action: the channels of a command, in order.
         control_step: seconds between commands.
-        scenery: what pictures of it show; None where there is nothing to see.
+        scenery: what pictures of it show, or what draws them; None where there is nothing to see.
     """
 
     observation: tuple[Channel, ...]
     action: tuple[Channel, ...]
     control_step: float
-    scenery: Scenery | None = None
+    scenery: Scenery | Artist | None = None
 
     @abstractmethod
     def reset(self, physics: Physics) -> None:
