@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cluster.cli.documents import one_document
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
 
@@ -20,6 +21,16 @@ Folder = Annotated[
         metavar="PLACE", help="Folder of the dataset, or s3://bucket/prefix.", parser=dataset_location
     ),
 ]
+AsJson = Annotated[
+    bool,
+    typer.Option(
+        "--json",
+        help="Print one JSON document, and nothing else, on standard output: folder, setup, episodes, "
+        "shards, bytes, horizon, control_step (s), channels, parameters, storage, seed, repeats, bad, "
+        "identity, fingerprint, pybullet, numpy, put_aside, statistics (null without episodes), irreducible "
+        "(null without repeats). What has no number is null.",
+    ),
+]
 
 
 def _open(folder: "Location") -> "Dataset":
@@ -32,8 +43,14 @@ def _open(folder: "Location") -> "Dataset":
 
 
 @app.command()
-def info(folder: Folder) -> None:
+def info(folder: Folder, *, as_json: AsJson = False) -> None:
     """What a dataset is and what its episodes are like."""
+    if as_json:
+        from cluster.datasets.facts import dataset_facts
+
+        with one_document() as document:
+            document |= dataset_facts(_open(folder))
+        return
     from rich.console import Console
     from rich.table import Table
 
