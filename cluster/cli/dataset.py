@@ -28,7 +28,7 @@ AsJson = Annotated[
         help="Print one JSON document, and nothing else, on standard output: folder, setup, episodes, "
         "shards, bytes, horizon, control_step (s), channels, parameters, storage, seed, repeats, bad, "
         "identity, fingerprint, pybullet, numpy, put_aside, statistics (null without episodes), irreducible "
-        "(null without repeats). What has no number is null.",
+        "(null without repeats), notes. What has no number is null.",
     ),
 ]
 

@@ -7,6 +7,7 @@ from cluster.datasets.quarantine import quarantined_shards
 from cluster.errors import UserError
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
+from workers.dataset.notes import notes
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import MARKS, statistics
 
@@ -29,6 +30,7 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
             **_identity(dataset.identity),
             "statistics": _statistics(dataset) if episodes else None,
             "irreducible": _irreducible(dataset),
+            "notes": notes(dataset),
         }
     except ValueError as error:
         raise UserError(
@@ -70,6 +72,7 @@ def _statistics(dataset: Dataset) -> dict[str, Any]:
         "badness": found.badness,
         "bad_steps": dict(found.bad_steps),
         "diverged": found.diverged,
+        "failed": found.failed,
         "stopped": dict(found.stopped),
     }
 

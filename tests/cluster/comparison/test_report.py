@@ -15,6 +15,7 @@ from cluster.comparison.worker import ComparisonJob
 from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
 from workers import setups
+from workers.attempts import Attempts
 from workers.tasks.quadratic import Quadratic
 
 
@@ -37,8 +38,8 @@ def job_in(folder) -> ComparisonJob:
 
 
 def run(job: ComparisonJob, key: RunKey) -> None:
-    with SETUP.open() as environment:
-        for _ in job.run(key, SETUP, environment):
+    with Attempts(SETUP) as attempts:
+        for _ in job.run(key, SETUP, attempts):
             pass
 
 
