@@ -8,6 +8,7 @@ import typer
 from cluster.cli.documents import one_document
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
+from svaedc.analysis.words import quantity
 
 if TYPE_CHECKING:
     from workers.dataset.folder import Dataset
@@ -84,15 +85,16 @@ def verify_command(
         typer.echo(f"episodes {gap.start} to {gap.stop - 1} are not collected yet")
     if found:
         raise UserError(
-            f"{len(found)} problems in {folder}; `svaedc dataset repair {folder}` recomputes what is broken "
-            "or missing and keeps what it replaces"
+            f"{quantity(len(found), 'problem')} in {folder}; `svaedc dataset repair {folder}` recomputes what is "
+            "broken or missing and keeps what it replaces"
         )
     if uncollected:
         raise UserError(
             f"every file in {folder} is whole, but episodes between them are not collected yet; "
             "run `svaedc collect` again: it collects exactly those"
         )
-    typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")
+    held = f"{quantity(dataset.episodes(), 'episode')} in {quantity(len(dataset.shards()), 'shard')}"
+    typer.echo(f"{folder} is whole: {held}")
 
 
 @app.command(name="repair")
@@ -111,8 +113,8 @@ def repair_command(folder: Folder) -> None:
         typer.echo(f"{defect.file}: {defect.what}")
     if left:
         raise UserError(
-            f"{len(left)} problems in {folder} are none of broken files; look at the files named above and "
-            "remove what does not belong there"
+            f"{quantity(len(left), 'problem')} in {folder}, none of broken files; look at the files named above "
+            "and remove what does not belong there"
         )
 
 
@@ -129,4 +131,4 @@ def export_command(
     dataset = _open(folder)
     with interruptible("nothing of it is kept, and the same command begins anew"), terminating_as_exit():
         export(dataset, form, out)
-    typer.echo(f"{out} holds {dataset.episodes()} episodes")
+    typer.echo(f"{out} holds {quantity(dataset.episodes(), 'episode')}")
