@@ -85,8 +85,8 @@ def verify_command(
         typer.echo(f"episodes {gap.start} to {gap.stop - 1} are not collected yet")
     if found:
         raise UserError(
-            f"{quantity(len(found), 'problem')} in {folder}; `svaedc dataset repair {folder}` recomputes what is "
-            "broken or missing and keeps what it replaces"
+            f"{quantity(len(found), 'problem')} in {folder}; `svaedc dataset repair {folder}` recomputes "
+            "what is broken or missing and keeps what it replaces"
         )
     if uncollected:
         raise UserError(
@@ -113,8 +113,8 @@ def repair_command(folder: Folder) -> None:
         typer.echo(f"{defect.file}: {defect.what}")
     if left:
         raise UserError(
-            f"{quantity(len(left), 'problem')} in {folder}, none of broken files; look at the files named above "
-            "and remove what does not belong there"
+            f"{quantity(len(left), 'problem')} in {folder}, none of broken files; look at the files named "
+            "above and remove what does not belong there"
         )
 
 

@@ -213,8 +213,12 @@ def _explanations(lines: Sequence[_Line], frame: tuple[float, float], level: str
     runs = f"n = {min(numbers)} runs each" if len(numbers) == 1 else "n runs"
     singles = ["thin lines, dots: single runs"] if any(line.is_of_few for line in lines) else []
     shades = "bars" if all(line.is_of_few for line in lines) else "shades and bars"
-    is_cut = any((line.interval[0] < frame[0]).any() or (line.interval[1] > frame[1]).any() for line in lines)
-    return [runs, *singles, f"{shades}: {level} intervals", *(["cut at the frame"] if is_cut else [])]
+    ends = [line.interval[:, -1] for line in lines]
+    is_cut = any(low < frame[0] or frame[1] < high for low, high in ends)
+    bars = (
+        [f"{shades}: {level} intervals,", "cut at the frame"] if is_cut else [f"{shades}: {level} intervals"]
+    )
+    return [runs, *singles, *bars]
 
 
 def _write(figure: Figure, path: Path) -> tuple[Path, Path]:

@@ -80,8 +80,8 @@ def collect_pilot(
     pilot = missing[: max(PILOT_SHARDS, 2 * actors)]
     if len(pilot) < 2:
         raise UserError(
-            f"{quantity(episodes_in(missing), 'episode')} left to collect in {dataset.folder}: too few to plan "
-            "for; leave out --plan"
+            f"{quantity(episodes_in(missing), 'episode')} left to collect in {dataset.folder}: too few to "
+            "plan for; leave out --plan"
         )
     session.preflight(actors)
     with tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run:
