@@ -58,6 +58,8 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
         tracked = begin(folder, tracker, f"compare {plan.setup.name}", parameters)
         with tracked.run:
             failure = _submit(plan, tracked, runs)
+            if failure is not None and not any(folder.runs().values()):
+                raise failure  # there is nothing to report
             summary = _record(plan, tracked, parameters)
             if failure is not None:
                 raise failure
