@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import json
+import math
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -131,6 +132,28 @@ def write_text(path: Path, text: str) -> None:
         unfinished.write_text(text, encoding="utf-8")
 
 
+def json_text(content: Any, indent: int | None = 2) -> str:
+    """JSON that every reader takes: a number that is not finite, for which JSON has no word, becomes null.
+
+    Args:
+        content: plain values.
+        indent: spaces of a level; None for one line.
+
+    Returns:
+        Text without a line end.
+    """
+    return json.dumps(json_values(content), indent=indent, allow_nan=False)
+
+
+def json_values(content: Any) -> Any:
+    """The same values, null where JSON has no word for a number."""
+    if isinstance(content, dict):
+        return {name: json_values(value) for name, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [json_values(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
+
+
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a file as a whole; what was there stays when there is no room.
 
@@ -141,7 +164,7 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    write_text(path, json.dumps(content, indent=2) + "\n")
+    write_text(path, json_text(content) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cluster.cli.documents import one_document
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
+from svaedc.analysis.words import quantity
 
 if TYPE_CHECKING:
     from workers.dataset.folder import Dataset
@@ -18,6 +20,16 @@ Folder = Annotated[
     Any,  # a Location, which typer does not know
     typer.Argument(
         metavar="PLACE", help="Folder of the dataset, or s3://bucket/prefix.", parser=dataset_location
+    ),
+]
+AsJson = Annotated[
+    bool,
+    typer.Option(
+        "--json",
+        help="Print one JSON document, and nothing else, on standard output: folder, setup, episodes, "
+        "shards, bytes, horizon, control_step (s), channels, parameters, storage, seed, repeats, bad, "
+        "identity, fingerprint, pybullet, numpy, put_aside, statistics (null without episodes), irreducible "
+        "(null without repeats), notes. What has no number is null.",
     ),
 ]
 
@@ -32,8 +44,14 @@ def _open(folder: "Location") -> "Dataset":
 
 
 @app.command()
-def info(folder: Folder) -> None:
+def info(folder: Folder, *, as_json: AsJson = False) -> None:
     """What a dataset is and what its episodes are like."""
+    if as_json:
+        from cluster.datasets.facts import dataset_facts
+
+        with one_document() as document:
+            document |= dataset_facts(_open(folder))
+        return
     from rich.console import Console
     from rich.table import Table
 
@@ -67,15 +85,16 @@ def verify_command(
         typer.echo(f"episodes {gap.start} to {gap.stop - 1} are not collected yet")
     if found:
         raise UserError(
-            f"{len(found)} problems in {folder}; `svaedc dataset repair {folder}` recomputes what is broken "
-            "or missing and keeps what it replaces"
+            f"{quantity(len(found), 'problem')} in {folder}; `svaedc dataset repair {folder}` recomputes "
+            "what is broken or missing and keeps what it replaces"
         )
     if uncollected:
         raise UserError(
             f"every file in {folder} is whole, but episodes between them are not collected yet; "
             "run `svaedc collect` again: it collects exactly those"
         )
-    typer.echo(f"{folder} is whole: {dataset.episodes()} episodes in {len(dataset.shards())} shards")
+    held = f"{quantity(dataset.episodes(), 'episode')} in {quantity(len(dataset.shards()), 'shard')}"
+    typer.echo(f"{folder} is whole: {held}")
 
 
 @app.command(name="repair")
@@ -94,8 +113,8 @@ def repair_command(folder: Folder) -> None:
         typer.echo(f"{defect.file}: {defect.what}")
     if left:
         raise UserError(
-            f"{len(left)} problems in {folder} are none of broken files; look at the files named above and "
-            "remove what does not belong there"
+            f"{quantity(len(left), 'problem')} in {folder}, none of broken files; look at the files named "
+            "above and remove what does not belong there"
         )
 
 
@@ -112,4 +131,4 @@ def export_command(
     dataset = _open(folder)
     with interruptible("nothing of it is kept, and the same command begins anew"), terminating_as_exit():
         export(dataset, form, out)
-    typer.echo(f"{out} holds {dataset.episodes()} episodes")
+    typer.echo(f"{out} holds {quantity(dataset.episodes(), 'episode')}")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cluster.cli.documents import one_document
 from cluster.cli.options import Address, Config, Overrides, Seed, TrainedModel, services, settings_of
 from cluster.hardware.states import Approval
 from cluster.inputs import durable
@@ -25,6 +26,16 @@ Folder = Annotated[
 ]
 TrialNumber = Annotated[int, typer.Option("--trial", min=0, help="Its number, as `status` shows it.")]
 Who = Annotated[str, typer.Option("--who", help="Your name; kept in the journal.")]
+
+AsJson = Annotated[
+    bool,
+    typer.Option(
+        "--json",
+        help="Print one JSON document, and nothing else, on standard output: campaign, robot, setup, method, "
+        "seed, model, pool, approval, phase, measured, planned, best, advice, trials (number, state, kind, "
+        "x, f, y). What was not measured is null.",
+    ),
+]
 
 
 @app.command()
@@ -76,11 +87,15 @@ def start(
 
 
 @app.command()
-def status(folder: Folder) -> None:
+def status(folder: Folder, *, as_json: AsJson = False) -> None:
     """How a campaign stands, trial by trial, and what it needs next."""
     from cluster.hardware import operator
 
-    _show(operator.status(folder))
+    if not as_json:
+        _show(operator.status(folder))
+        return
+    with one_document() as document:
+        document |= operator.status(folder).as_json()
 
 
 @app.command()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cluster.comparison.folder import FIGURE, PAGE, SUMMARY, TABLE
+from cluster.comparison.missing import missing_runs
 from cluster.comparison.plan import ComparisonPlan, run_parameters
 from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.report import lines, publish, summary_of
@@ -57,6 +58,8 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
         tracked = begin(folder, tracker, f"compare {plan.setup.name}", parameters)
         with tracked.run:
             failure = _submit(plan, tracked, runs)
+            if failure is not None and not any(folder.runs().values()):
+                raise failure  # there is nothing to report
             summary = _record(plan, tracked, parameters)
             if failure is not None:
                 raise failure
@@ -93,13 +96,16 @@ def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mappin
     runs = folder.runs()
     summary = summary_of(plan.job, plan.setup, runs)
     settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.url}
-    report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
+    keys = plan.grid.keys()
+    report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption, keys)
     for line in lines(summary):
         say(line)
+    if missing := str(missing_runs(keys, runs, plan.job.length)):
+        say(missing)
     for path in folder.failures()[:1]:
         say(f"trials failed; what the first of them failed of is in {path}")
     say(f"{folder.path / PAGE}; {tracked.run.url}")
-    asked = set(plan.grid.keys())
+    asked = set(keys)
     for key, trials in runs.items():
         if key in asked:
             tracked.child(key, trials)

@@ -1,8 +1,9 @@
-"""A comparison as one HTML file that opens anywhere: figures, tables, settings, fingerprints."""
+"""A comparison as one HTML file that opens anywhere: verdict, figures, tables, settings, fingerprints."""
 
 import math
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from svaedc.analysis.statistics import Estimate
 from svaedc.analysis.summary import Difference, MethodSummary, Summary
+from svaedc.analysis.verdict import judge, leader, sentences, verdict
+from svaedc.analysis.words import quantity
 
 TEMPLATE = "report.html.j2"
 """The page: its words, its tables and their columns. What is computed for it is below."""
@@ -18,7 +21,12 @@ _TUNING = "These runs have tuning seeds: they are for choosing settings, and the
 
 
 def page(
-    title: str, summary: Summary, figures: Sequence[Path], initial: int, settings: Mapping[str, Any]
+    title: str,
+    summary: Summary,
+    figures: Sequence[Path],
+    initial: int,
+    settings: Mapping[str, Any],
+    missing: str = "",
 ) -> str:
     """Compose the whole page; it loads nothing from elsewhere and runs no script.
 
@@ -28,6 +36,7 @@ def page(
         figures: files to embed.
         initial: shared random trials.
         settings: what the comparison was made with, fingerprints included.
+        missing: a sentence on what it lacks of what was asked for; "" for nothing.
 
     Returns:
         The page as HTML.
@@ -39,19 +48,28 @@ def page(
         keep_trailing_newline=True,
     )
     environment.filters |= {
-        "estimate": _estimate,
+        "number": _number,
+        "interval": _interval,
         "share": _share,
         "until_success": _until_success,
         "p_value": _p_value,
+        "judgement": partial(judge, summary),
+        "quantity": quantity,
     }
+    first, methods = leader(summary), summary.methods
     return environment.get_template(TEMPLATE).render(
         title=title,
-        notes=[*([_TUNING] if summary.purpose != "reporting" else []), *_remarks(summary)],
+        notes=list(_notes(summary, missing)),
+        verdict=verdict(summary),
+        sentences=list(sentences(summary, first)) if first else [],
+        leader=first,
         trials=summary.trials,
+        level=f"{summary.confidence * 100:g} %",
         initial=initial,
         figures=[_image(path) for path in figures],
-        after=checkpoints(summary, initial),
-        methods=sorted(summary.methods.items(), key=_best_first),
+        checkpoints=[(index, _after(index, initial)) for index in checkpoints(summary, initial)],
+        methods=sorted(methods.items(), key=_best_first),
+        breakable=any(not math.isnan(method.broken_trials.mean) for method in methods.values()),
         differences=list(_differences_by_method(summary)),
         settings=list(settings.items()),
     )
@@ -72,15 +90,28 @@ def checkpoints(summary: Summary, initial: int) -> list[int]:
     return sorted(index for index in wanted if index < summary.trials)
 
 
-def _remarks(summary: Summary) -> Iterable[str]:
+def _after(index: int, initial: int) -> str:
+    """The head of the column of a trial."""
+    suggested = index + 1 - initial
+    return f"best after {suggested} suggested" if suggested > 0 else f"best after {index + 1} random"
+
+
+def _notes(summary: Summary, missing: str) -> Iterable[str]:
     """What a reader would otherwise wonder about."""
+    if missing:
+        yield f"{missing}."
+    if summary.purpose != "reporting":
+        yield _TUNING
     ran = [method for method in summary.methods.values() if method.runs]
     if ran and not any(method.first_success.reached for method in ran):
         yield "Nobody reached the threshold of success: no run of any method succeeded in any trial."
-    if any(method.failed_trials.mean > 0 for method in ran):
+    failed, tried = (
+        sum(getattr(method, name) for method in summary.methods.values()) for name in ("failed", "tried")
+    )
+    if failed:
         yield (
-            "Some trials gave no objective. They teach no method anything, are not tried again, and enter no "
-            "mean; the last column has their share."
+            f"{failed} of {quantity(tried, 'trial')} failed: they gave no objective. They teach no method "
+            "anything, are not tried again, and enter no mean."
         )
 
 
@@ -89,30 +120,33 @@ def _image(path: Path) -> dict[str, str]:
     return {"name": path.stem, "type": _MEDIA_TYPES[path.suffix], "data": data}
 
 
-def _best_first(named: tuple[str, MethodSummary]) -> float:
-    best = named[1].best[-1].mean
-    return math.inf if math.isnan(best) else -best
+def _best_first(named: tuple[str, MethodSummary]) -> tuple[bool, float]:
+    """Methods without an objective come last, and those without a whole run after them."""
+    _, method = named
+    best = method.best[-1].mean
+    return (not method.runs, math.inf if math.isnan(best) else -best)
 
 
 def _until_success(method: MethodSummary) -> str:
-    found = method.first_success
-    median = "not reached" if math.isnan(found.median) else f"{found.median:g}"
-    return f"{median} ({found.reached} of {method.runs} runs)"
+    median = method.first_success.median
+    return "not reached" if math.isnan(median) else f"{median:g}"
 
 
 def _differences_by_method(summary: Summary) -> Iterator[tuple[str, list[Difference]]]:
-    """The differences of each method that was compared with another."""
-    for name in summary.methods:
+    """The differences of each method that was compared with another, those of the leader first."""
+    for name in sorted(summary.methods, key=lambda name: name != leader(summary)):
         found = [each for each in summary.differences if each.method == name]
         if found:
             yield name, found
 
 
-def _estimate(value: Estimate) -> str:
-    if math.isnan(value.mean):
-        return "–"
-    interval = "" if math.isnan(value.low) else f" [{value.low:+.3f}, {value.high:+.3f}]"
-    return f"{value.mean:+.3f}{interval}"
+def _number(value: Estimate) -> str:
+    return "–" if math.isnan(value.mean) else f"{value.mean:+.3f}"
+
+
+def _interval(value: Estimate) -> str:
+    """Nothing where too few runs tell."""
+    return "" if math.isnan(value.low) else f"[{value.low:+.3f}, {value.high:+.3f}]"
 
 
 def _share(value: Estimate) -> str:
@@ -120,4 +154,4 @@ def _share(value: Estimate) -> str:
 
 
 def _p_value(value: float) -> str:
-    return "–" if math.isnan(value) else ("< 0.001" if value < 0.001 else f"{value:.3f}")
+    return "" if math.isnan(value) else ("p < 0.001" if value < 0.001 else f"p = {value:.3f}")

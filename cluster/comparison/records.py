@@ -2,6 +2,7 @@
 
 import fcntl
 import json
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cluster.errors import UserError
-from cluster.files import replacing
+from cluster.files import json_text, replacing
 from svaedc.analysis.summary import Row
 from svaedc.bo.loop import Trial
 
@@ -53,7 +54,7 @@ def append(path: Path, trial: Trial) -> None:
         # A worker whose driver died may still be at it.
         fcntl.flock(file, fcntl.LOCK_EX)
         _drop_torn_line(file)
-        file.write(json.dumps(_fields(trial)).encode() + b"\n")
+        file.write(json_text(_fields(trial), indent=None).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
 
@@ -92,8 +93,10 @@ def read_trials(path: Path) -> list[Trial]:
 
 
 def _trial(line: dict[str, Any]) -> Trial:
-    x = np.array(line.pop("x"), dtype=np.float32)
-    return Trial(index=line.pop("trial"), x=x, **line)
+    """The trial of a line; a failed one holds null, or NaN, which older versions wrote."""
+    index, x = line.pop("trial"), np.array(line.pop("x"), dtype=np.float32)
+    numbers = {name: math.nan if line[name] is None else line[name] for name in ("f", "y", "best")}
+    return Trial(**{**line, **numbers}, index=index, x=x)
 
 
 def rows(runs: Runs) -> list[Row]:

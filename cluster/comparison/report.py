@@ -1,8 +1,7 @@
-"""What people read of a comparison: a table, a summary and a figure."""
+"""What people and programs read of a comparison: a table, a summary, a figure, a page, lines."""
 
-import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -12,10 +11,14 @@ from cluster import files
 from cluster.comparison import figure
 from cluster.comparison.folder import FIGURE, PAGE, SUMMARY
 from cluster.comparison.html import page
-from cluster.comparison.records import Runs, rows
+from cluster.comparison.missing import MissingRuns, missing_runs
+from cluster.comparison.records import RunKey, Runs, rows
 from cluster.comparison.worker import ComparisonJob
-from svaedc.analysis.aggregation import summarize
-from svaedc.analysis.summary import Reporting, Summary
+from svaedc.analysis.aggregation import best_of_runs, summarize
+from svaedc.analysis.statistics import Estimate
+from svaedc.analysis.summary import MethodSummary, Reporting, Summary
+from svaedc.analysis.verdict import judge, leader, sentences, verdict
+from svaedc.analysis.words import quantity
 from workers.hardware import robots
 from workers.randomness import Stream, generator
 from workers.setups import Setup
@@ -53,6 +56,7 @@ def publish(
     summary: Summary,
     settings: Mapping[str, Any],
     caption: str = "",
+    asked: Iterable[RunKey] = (),
 ) -> Report:
     """Write what people read; each file is whole, or as it was before.
 
@@ -63,6 +67,7 @@ def publish(
         summary: of them.
         settings: that the comparison was made with, for the page.
         caption: before the title of figure and page; "" for none.
+        asked: the runs that were asked for; without any, those that there are.
 
     Returns:
         The files that were written.
@@ -71,19 +76,55 @@ def publish(
         UserError: the disk is full.
     """
     folder, title = job.folder, _title(job, setup, caption)
+    missing = missing_runs(tuple(asked) or runs, runs, job.length)
     table = folder.write_table(runs, {"setup": job.setup, "gap": job.gap})
-    written = folder.write(SUMMARY, json.dumps({"title": title, **summary.as_json()}, indent=2) + "\n")
+    content = document(job, setup, summary, missing, caption)
+    written = folder.write(SUMMARY, files.json_text(content) + "\n")
     with files.writing(folder.path):
         drawn = figure.best_so_far(
             folder.path / FIGURE,
             summary,
+            best_of_runs(row for row in rows(runs) if row.trial < summary.trials),
             title=title,
             initial=job.initial,
             limits=setup.objective_limits,
         )
     versions = {f"version of {name}": version(name) for name in _VERSIONS}
-    report = folder.write(PAGE, page(title, summary, drawn[1:], job.initial, {**settings, **versions}))
-    return Report((table, written, report), drawn)
+    text = page(title, summary, drawn[1:], job.initial, {**settings, **versions}, str(missing))
+    return Report((table, written, folder.write(PAGE, text)), drawn)
+
+
+def document(
+    job: ComparisonJob, setup: Setup, summary: Summary, missing: MissingRuns, caption: str = ""
+) -> dict[str, Any]:
+    """All that is said of a comparison as plain values, for `summary.json` and `--json`.
+
+    Args:
+        job: what all runs share.
+        setup: whose objective was maximised.
+        summary: of the runs.
+        missing: of the runs asked for.
+        caption: before the title; "" for none.
+
+    Returns:
+        The summary by name, with its verdict and what it lacks.
+    """
+    first, plain = leader(summary), summary.as_json()
+    judgements = [judge(summary, each) for each in summary.differences]
+    return {
+        "title": _title(job, setup, caption),
+        "setup": job.setup,
+        "gap": job.gap,
+        "initial_trials": job.initial,
+        "verdict": verdict(summary),
+        "pairs": list(sentences(summary, first)) if first else [],
+        "missing": missing.as_json(),
+        **plain,
+        "differences": [
+            {**each, "judgement": judgement}
+            for each, judgement in zip(plain["differences"], judgements, strict=True)
+        ],
+    }
 
 
 def _title(job: ComparisonJob, setup: Setup, caption: str) -> str:
@@ -95,15 +136,34 @@ def _title(job: ComparisonJob, setup: Setup, caption: str) -> str:
 
 
 def lines(summary: Summary) -> Iterator[str]:
-    """A line about every method."""
+    """A line about every method, and the verdict."""
     for name, method in summary.methods.items():
-        if not method.runs:
-            yield f"{name:>18}: no run has all {summary.trials} trials yet"
-            continue
-        best, broken = method.best[-1], method.broken_trials.mean
-        trouble = "" if math.isnan(broken) else f"broken {broken:.0%}, "
-        yield (
-            f"{name:>18}: best after {summary.trials} trials {best.mean:+.2f} "
-            f"[{best.low:+.2f}, {best.high:+.2f}], mean objective of its trials "
-            f"{method.objective.mean:+.2f}, {trouble}{method.runs} runs"
-        )
+        yield f"{name:>18}: {', '.join(_facts(method, summary.trials))}"
+    yield verdict(summary)
+
+
+def _facts(method: MethodSummary, trials: int) -> Iterator[str]:
+    """What a line says of a method, in parts."""
+    best, objective, broken = method.best[-1], method.objective.mean, method.broken_trials.mean
+    if not method.runs:
+        yield f"no run has all {quantity(trials, 'trial')} yet"
+    elif math.isnan(best.mean):
+        yield f"no objective after {quantity(trials, 'trial')}"
+    else:
+        yield f"best after {quantity(trials, 'trial')} {_estimate(best)}"
+    if not math.isnan(objective):
+        yield f"mean objective of its trials {objective:+.2f}"
+    if not math.isnan(broken):
+        yield f"broken {broken:.0%}"
+    if method.failed:
+        yield f"{method.failed} of {quantity(method.tried, 'trial')} failed"
+    if method.runs:
+        yield quantity(method.runs, "run")
+    if method.incomplete:
+        yield f"{quantity(method.incomplete, 'run')} not whole"
+
+
+def _estimate(value: Estimate) -> str:
+    """A number, with its interval where there is one."""
+    interval = "" if math.isnan(value.low) else f" [{value.low:+.2f}, {value.high:+.2f}]"
+    return f"{value.mean:+.2f}{interval}"

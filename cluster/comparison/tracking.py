@@ -10,6 +10,7 @@ from typing import Any
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.report import Report
+from cluster.files import json_text
 from cluster.tracking import Run, Tracker
 from cluster.tracking.recorder import Recorder
 from svaedc.bo.loop import Trial
@@ -134,4 +135,4 @@ class TrackedComparison:
         self._save()
 
     def _save(self) -> None:
-        self._folder.write(NOTE, json.dumps(asdict(self._note), indent=2) + "\n")
+        self._folder.write(NOTE, json_text(asdict(self._note)) + "\n")

@@ -11,6 +11,7 @@ from cluster.errors import UserError
 from cluster.progress import duration, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
+from svaedc.analysis.words import quantity
 from workers.collection.forecast import forecast, pilot_of
 from workers.dataset.folder import Dataset
 from workers.dataset.notes import notes
@@ -79,8 +80,8 @@ def collect_pilot(
     pilot = pilot_of(missing, actors)
     if len(pilot) < 2:
         raise UserError(
-            f"{episodes_in(missing)} episodes are left to collect in {dataset.folder}: too few to plan for; "
-            "leave out --plan"
+            f"{quantity(episodes_in(missing), 'episode')} left to collect in {dataset.folder}: too few to "
+            "plan for; leave out --plan"
         )
     session.preflight(actors)
     warn_of_others(dataset)
@@ -115,7 +116,7 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
     dataset = plan.dataset
     release(dataset)
     say(
-        f"{dataset.folder} holds {dataset.episodes()} episodes, {dataset.size() / 1e6:.1f} MB; "
+        f"{dataset.folder} holds {quantity(dataset.episodes(), 'episode')}, {dataset.size() / 1e6:.1f} MB; "
         f"{counts.episodes} new in {duration(counts.seconds)} "
         f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
@@ -128,6 +129,6 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
     left = quarantined_shards(dataset, plan.episodes)
     if left:
         raise UserError(
-            f"{len(left)} shards kept failing, {left[0].name} among them; their errors are in "
+            f"{quantity(len(left), 'shard')} kept failing, {left[0].name} among them; their errors are in "
             f"{dataset.folder / FOLDER}, and the same command tries them again"
         )

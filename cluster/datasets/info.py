@@ -2,6 +2,7 @@
 
 from cluster.datasets.quarantine import quarantined_shards
 from cluster.errors import UserError
+from svaedc.analysis.words import quantity
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.notes import notes
@@ -19,11 +20,11 @@ def dataset_info(dataset: Dataset) -> dict[str, str]:
     episodes, kilobytes = dataset.episodes(), dataset.size() / 1e3
     rows = {
         "setup": identity.setup,
-        "episodes": f"{episodes} in {len(dataset.shards())} shards",
+        "episodes": f"{episodes} in {quantity(len(dataset.shards()), 'shard')}",
         "size": f"{kilobytes / 1e3:.1f} MB, {kilobytes / max(episodes, 1):.1f} kB an episode",
-        "each": f"{identity.horizon} steps of {identity.control_step * 1e3:g} ms",
-        "observation": f"{len(identity.observation)} channels, stored as {identity.storage}",
-        "controller": f"{len(identity.parameters)} parameters",
+        "each": f"{quantity(identity.horizon, 'step')} of {identity.control_step * 1e3:g} ms",
+        "observation": f"{quantity(len(identity.observation), 'channel')}, stored as {identity.storage}",
+        "controller": quantity(len(identity.parameters), "parameter"),
         "seed": str(identity.seed),
         "G_bad": _g_bad(identity),
         "repeats": f"{identity.repeats} of each controller",

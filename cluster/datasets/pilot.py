@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cluster.datasets.progress import CollectionProgress
+from cluster.files import json_text
 from cluster.progress import duration, say
 from workers.collection.forecast import LEVEL, Forecast, Prediction
 from workers.dataset.folder import Dataset
@@ -143,7 +144,7 @@ def _write(dataset: Dataset, plan: Mapping[str, Any]) -> None:
     """At once, under a name of this process, for a second driver may do the same; a failure costs no data."""
     try:
         with temporary_file(dataset.folder, PLAN) as temporary:
-            temporary.write_text(json.dumps(plan, indent=2) + "\n")
+            temporary.write_text(json_text(plan) + "\n")
             synchronise(temporary)
             move(temporary, _path(dataset))
     except OSError as error:

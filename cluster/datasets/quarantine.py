@@ -1,10 +1,10 @@
 """Shards that kept failing, put aside with their errors, and accounts of episodes that failed alone."""
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
 
 from cluster.failures import failure_text
+from cluster.files import json_text
 from workers.collection.shard import FailedEpisode
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard, shard_named
@@ -30,9 +30,8 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
     """
     path = _path(dataset, shard)
     path.parent.mkdir(exist_ok=True)
-    path.write_text(
-        json.dumps({"start": shard.start, "stop": shard.stop, "errors": list(errors)}, indent=2) + "\n"
-    )
+    content = {"start": shard.start, "stop": shard.stop, "errors": list(errors)}
+    path.write_text(json_text(content) + "\n")
     return path
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from cluster.errors import UserError
 from cluster.inputs import setup_of
 from cluster.progress import ProgressLine, say
+from svaedc.analysis.words import quantity
 from workers.collection.recompute import draw_shards, find_broken, rederive, repair
 from workers.collection.shard import require_same_code
 from workers.dataset.folder import Dataset
@@ -35,7 +36,7 @@ def recompute_shards(dataset: Dataset, count: int) -> list[Defect]:
     with ProgressLine("episodes", sum(shard.episodes for shard in chosen), 0) as progress:
         for shard in chosen:
             found += rederive(setup, dataset, shard)
-            progress.advance(shard.episodes, f"{len(found)} problems")
+            progress.advance(shard.episodes, quantity(len(found), "problem"))
     return found
 
 

@@ -2,6 +2,7 @@
 
 from cluster.datasets.repair import recompute_shards
 from cluster.progress import ProgressLine
+from svaedc.analysis.words import quantity
 from workers.dataset.folder import Dataset
 from workers.dataset.inventory import inventory
 from workers.dataset.verification import Defect, verify
@@ -29,5 +30,5 @@ def _defects_in_files(dataset: Dataset) -> list[Defect]:
     with ProgressLine("episodes", dataset.episodes(), 0) as progress:
         for shard, defects in verify(dataset):
             found += defects
-            progress.advance(shard.episodes, f"{len(found)} problems")
+            progress.advance(shard.episodes, quantity(len(found), "problem"))
     return found

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from cluster.hardware.events import CampaignTrial
 from cluster.hardware.identity import CampaignIdentity
@@ -90,6 +91,34 @@ class Status:
     def best(self) -> float | None:
         """Largest objective measured so far."""
         return max((trial.f for trial in self.trials if trial.f is not None), default=None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values by name; of a trial, its controller as numbers of [0, 1]."""
+        identity = self.identity
+        return {
+            "campaign": self.name,
+            **{
+                name: getattr(identity, name)
+                for name in ("robot", "setup", "method", "seed", "model", "pool")
+            },
+            "approval": str(identity.approval),
+            "phase": str(self.phase),
+            "measured": self.measured,
+            "planned": self.planned,
+            "best": self.best,
+            "advice": self.advice,
+            "trials": [
+                {
+                    "number": trial.number,
+                    "state": str(trial.state),
+                    "kind": trial.kind,
+                    "x": trial.x.tolist(),
+                    "f": trial.f,
+                    "y": trial.y,
+                }
+                for trial in self.trials
+            ],
+        }
 
 
 def status(journal: Journal, executor: Process | None) -> Status:

@@ -20,6 +20,7 @@ from mlflow.protos.databricks_pb2 import RESOURCE_DOES_NOT_EXIST, ErrorCode
 from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.errors import UserError
+from cluster.files import json_values
 from workers.dataset.storage.location import Location
 
 UI_PORT = 5000
@@ -93,7 +94,7 @@ class Run:
             content: plain values by name.
         """
         with self.tracker.reaching():
-            self.tracker.client.log_dict(self.id, {**content}, f"{name}.json")
+            self.tracker.client.log_dict(self.id, json_values({**content}), f"{name}.json")
 
     def dataset(self, name: str, fingerprint: str, path: Location) -> None:
         """Records a dataset as the run's input.

@@ -1,6 +1,7 @@
 """One point of a sweep: train a model in this process, measure it, and try it out on recorded episodes."""
 
 from dataclasses import asdict, dataclass
+from math import nan
 from typing import Any
 
 import torch
@@ -46,7 +47,9 @@ class SweepPoint:
                     f"{path} was made for {name} {made.get(name)!r}, not {value!r}; sweep into another "
                     "--model folder, or ask for what this one holds"
                 )
-        return found
+        # Measures that are no numbers, such as those of y of an SVAE, are null in the file.
+        measures = {key: nan if value is None else value for key, value in found.get("metrics", {}).items()}
+        return {**found, "metrics": measures}
 
     def _identity(self) -> dict[str, Any]:
         return {"name": self.name, "origin": self.job.origin, "updates": self.updates}

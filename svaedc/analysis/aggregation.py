@@ -19,6 +19,8 @@ class _Runs:
 
     run: tuple[int, ...]
     incomplete: int
+    tried: int
+    failed: int
     f: Float[np.ndarray, "runs trials"]
     success: Bool[np.ndarray, "runs trials"]
 
@@ -46,11 +48,12 @@ def summarize(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
         ValueError: There are no rows, one trial has two, or reporting and tuning seeds are mixed.
     """
     by_method, seed = _by_method(rows), int(rng.integers(2**32))
-    length = max(len(trials) for runs in by_method.values() for trials in runs.values())
+    length = _longest(by_method)
     complete = {name: _complete(by_method[name], length) for name in sorted(by_method)}
     return Summary(
         trials=length,
         purpose=common_purpose(run for runs in by_method.values() for run in runs),
+        confidence=reporting.confidence,
         methods={name: _of_method(runs, reporting) for name, runs in complete.items()},
         differences=tuple(
             difference
@@ -58,6 +61,21 @@ def summarize(rows: Iterable[Row], reporting: Reporting, rng: np.random.Generato
             for difference in _differences(method, complete, reporting, seed)
         ),
     )
+
+
+def best_of_runs(rows: Iterable[Row]) -> dict[str, Float[np.ndarray, "runs trials"]]:
+    """The largest objective so far of every complete run, by method; NaN until there is one.
+
+    Raises:
+        ValueError: There are no rows, or one trial has two.
+    """
+    by_method = _by_method(rows)
+    length = _longest(by_method)
+    return {name: _complete(by_method[name], length).best for name in sorted(by_method)}
+
+
+def _longest(by_method: Mapping[str, Mapping[int, Mapping[int, Row]]]) -> int:
+    return max(len(trials) for runs in by_method.values() for trials in runs.values())
 
 
 def _by_method(rows: Iterable[Row]) -> dict[str, dict[int, dict[int, Row]]]:
@@ -79,7 +97,9 @@ def _complete(runs: Mapping[int, Mapping[int, Row]], length: int) -> _Runs:
     table = [[runs[r][trial] for trial in range(length)] for r in run]
     f = np.array([[row.f for row in rows] for rows in table], dtype=float).reshape(-1, length)
     success = np.array([[row.success for row in rows] for rows in table], dtype=bool).reshape(-1, length)
-    return _Runs(run, len(runs) - len(run), f, success)
+    every = [row for trials in runs.values() for row in trials.values()]
+    failed = sum(math.isnan(row.f) for row in every)
+    return _Runs(run, len(runs) - len(run), len(every), failed, f, success)
 
 
 def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
@@ -93,6 +113,8 @@ def _of_method(runs: _Runs, reporting: Reporting) -> MethodSummary:
     return MethodSummary(
         runs=len(runs.run),
         incomplete=runs.incomplete,
+        tried=runs.tried,
+        failed=runs.failed,
         best=tuple(map(estimate, runs.best.T)),
         median_best=_medians(runs.best),
         objective=estimate(_mean_of_rows(f)),

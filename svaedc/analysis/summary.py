@@ -77,6 +77,8 @@ class MethodSummary:
     Attributes:
         runs: Complete runs.
         incomplete: Runs left out because trials are missing.
+        tried: Trials that were made, the shared first ones and those of incomplete runs included.
+        failed: How many of these gave no objective.
         best: Best objective so far, at each trial.
         median_best: Median over runs of the same; NaN while a run has none.
         objective: Mean objective of the trials the method suggested.
@@ -89,6 +91,8 @@ class MethodSummary:
 
     runs: int
     incomplete: int
+    tried: int
+    failed: int
     best: tuple[Estimate, ...]
     median_best: tuple[float, ...]
     objective: Estimate
@@ -130,24 +134,26 @@ class Summary:
     Attributes:
         trials: Trials of a complete run.
         purpose: What its seeds are for; numbers from tuning seeds are no results.
+        confidence: Of every interval.
         methods: By name.
         differences: Every method against every other.
     """
 
     trials: int
     purpose: Purpose
+    confidence: float
     methods: Mapping[str, MethodSummary]
     differences: tuple[Difference, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists, and numbers; NaN, which JSON lacks, becomes None."""
-        plain: dict[str, Any] = _without_nan(asdict(self))
+        """Plain dictionaries, lists, and numbers; what is not finite, which JSON lacks, becomes None."""
+        plain: dict[str, Any] = _plain(asdict(self))
         return plain
 
 
-def _without_nan(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _without_nan(part) for key, part in value.items()}
+        return {key: _plain(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_nan(part) for part in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

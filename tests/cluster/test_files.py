@@ -1,12 +1,14 @@
-"""One command at a time works in a folder."""
+"""One command at a time works in a folder, and JSON is strict."""
 
+import json
+import math
 import subprocess
 import sys
 
 import pytest
 
 from cluster.errors import UserError
-from cluster.files import alone_in
+from cluster.files import alone_in, json_text, read_json, write_json
 
 HOLDER = """
 import os, sys, time
@@ -34,3 +36,18 @@ def test_a_killed_command_leaves_the_folder_free(tmp_path):
         holder.wait()
         with alone_in(tmp_path, "taken"):
             assert holder.returncode < 0
+
+
+def test_json_has_null_for_numbers_that_it_lacks_and_all_else_as_it_was(tmp_path):
+    content = {"a": math.nan, "b": [math.inf, 1.5, (-math.inf,)], "c": {"d": math.nan, "e": "NaN", "f": True}}
+    write_json(tmp_path / "some.json", content)
+    found = json.loads((tmp_path / "some.json").read_text(), parse_constant=pytest.fail)
+    assert found == {"a": None, "b": [None, 1.5, [None]], "c": {"d": None, "e": "NaN", "f": True}}
+    whole = {"a": 0.1, "b": [1, "x", None]}
+    assert json_text(whole) == json.dumps(whole, indent=2)
+    assert json_text(whole, indent=None) == json.dumps(whole)
+
+
+def test_the_nan_of_older_files_is_read(tmp_path):
+    (tmp_path / "old.json").write_text('{"a": NaN}')
+    assert math.isnan(read_json(tmp_path / "old.json")["a"])

@@ -123,4 +123,9 @@ def test_runs_that_keep_failing_are_named_with_their_errors_and_cost_no_other_ru
     said = capfd.readouterr()
     assert said.out == ""
     lines = [line for line in said.err.splitlines() if "best so far" not in line]
-    assert lines == ["run se 1000 failed and is tried again from its last trial"] * 2
+    assert lines[:2] == ["run se 1000 failed and is tried again from its last trial"] * 2
+    missing = (
+        "1 of 2 runs is not whole (7 trials each): se 1000 has 1 trial. `svaedc compare` goes on with them"
+    )
+    assert missing in lines
+    assert "1 of 2 runs is not whole" in (out / "report.html").read_text()

@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -11,6 +12,8 @@ from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.report import lines, publish, summary_of
 from cluster.comparison.worker import ComparisonJob
+from svaedc.analysis.aggregation import summarize
+from svaedc.analysis.summary import Reporting, Row
 from workers import setups
 from workers.attempts import Attempts
 from workers.tasks.quadratic import Quadratic
@@ -80,9 +83,9 @@ def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(j
     summary = summary_of(job, SETUP, runs)
     publish(job, SETUP, runs, summary, {})
     page = (job.folder.path / "report.html").read_text()
-    assert "Some trials gave no objective. They teach no method anything" in page
+    assert "trials failed: they gave no objective. They teach no method anything" in page
     assert "Nobody reached the threshold of success" in page
-    assert "not reached (0 of 2 runs)" in page
+    assert "not reached" in page
     written = (job.folder.path / "summary.json").read_text()
     found = json.loads(written, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert found["title"] == "quadratic-30d-intrinsic-3: Bayesian optimisation"  # a formula hides no physics
@@ -92,6 +95,26 @@ def test_the_report_explains_missing_objectives_and_a_threshold_nobody_reached(j
     )
     shares = [method["failed_trials"]["mean"] for method in found["methods"].values()]
     assert sum(shares) * 12 == pytest.approx(failed)
+    all_failed = sum(trial.status == "failed" for trials in runs.values() for trial in trials)
+    assert sum(method["failed"] for method in found["methods"].values()) == all_failed
+    assert f"{all_failed} of 32 trials failed" in page
     table = pq.read_table(job.folder.path / "trials.parquet").to_pylist()
     assert {row["status"] for row in table if math.isnan(row["f"])} == {"failed"}
-    assert all("best after 8 trials" in line for line in lines(summary))
+    *methods, last = lines(summary)
+    assert all("best after 8 trials" in line for line in methods)
+    assert ["of 16 trials failed" in line for line in methods] == [
+        method.failed > 0 for method in summary.methods.values()
+    ]
+    assert "too few runs to tell it from" in last
+    assert found["verdict"] == last
+    assert {each["judgement"] for each in found["differences"]} == {"too few runs"}
+
+
+@pytest.mark.parametrize("f", [0.5, math.nan])
+def test_lines_of_one_run_or_failed_ones_have_no_nan_and_the_right_number(f):
+    rows = [Row("se", 0, index, f, success=False) for index in range(4)]
+    [line, _] = lines(summarize(rows, Reporting(), np.random.default_rng(0)))
+    assert line.endswith(", 1 run")
+    assert "nan" not in line
+    assert ("4 of 4 trials failed" in line) == math.isnan(f)
+    assert "[" not in line

@@ -98,7 +98,7 @@ def test_rollouts_that_hang_are_killed_and_tried_again_and_stall_nothing(folder)
     assert first.returncode == 1
     tried = [f"{Shard(start, start + 4).name} failed and is tried again" for start in (0, 4, 8, 12)]
     assert all(f"{text}: took longer than {LIMIT} s" in first.stderr for text in tried), first.stderr
-    assert f"1 shards kept failing, {Shard(12, 16).name} among them" in first.stderr
+    assert f"1 shard kept failing, {Shard(12, 16).name} among them" in first.stderr
     dataset = open_dataset(folder / "data")
     assert dataset.missing(24) == [Shard(12, 16)]
     kept = json.loads((folder / "data" / "quarantine" / f"{Shard(12, 16).name}.json").read_text())

@@ -12,7 +12,7 @@ from workers.dataset.shards import Shard
 def test_the_lines_count_what_the_dataset_holds(tmp_path):
     dataset = alone(tmp_path, 3)
     told = dataset_info(dataset)
-    assert told["episodes"] == "3 in 1 shards"
+    assert told["episodes"] == "3 in 1 shard"
     assert told["each"] == "500 steps of 2 ms"
     assert told["G_bad"] == "the setup's own, bits"
     assert told["fingerprint"] == dataset.fingerprint()

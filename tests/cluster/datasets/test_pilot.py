@@ -113,5 +113,5 @@ def test_a_plan_that_nobody_can_read_changes_nothing(dataset, content):
 
 
 def test_too_little_to_plan_for_is_refused(ray_session, tracking_settings, tmp_path):
-    with pytest.raises(UserError, match=r"2 episodes are left to collect in .*: too few to plan for"):
+    with pytest.raises(UserError, match=r"2 episodes left to collect in .*: too few to plan for"):
         collect_pilot(*job(tmp_path / "dataset", 2, ray_session, open_tracker(tracking_settings)))

@@ -29,7 +29,7 @@ def test_a_shard_that_keeps_failing_is_put_aside_until_it_succeeds(
     folder, blocked = tmp_path / "dataset", Shard(8, 12)
     obstacle = digest_path(folder, blocked)
     obstacle.mkdir(parents=True)
-    with pytest.raises(UserError, match=rf"1 shards kept failing, {blocked.name} among them"):
+    with pytest.raises(UserError, match=rf"1 shard kept failing, {blocked.name} among them"):
         collected(folder, 12, ray_session, tracking_settings)
     dataset = open_dataset(folder)
     assert dataset.shards() == [Shard(0, 8)]

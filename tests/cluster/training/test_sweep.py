@@ -1,6 +1,7 @@
 """`svaedc train --sweep`: models around a preset, ranked by what they are worth on recorded episodes."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,16 @@ def written(of: SweepPoint) -> SweepPoint:
 def test_a_point_takes_up_its_own_result(tmp_path):
     assert point(tmp_path).result == {}
     assert written(point(tmp_path)).result["svae-dc"] == {"best": 0.5}
+
+
+def test_measures_that_are_no_numbers_come_back_as_they_were(tmp_path):
+    made = written(point(tmp_path))
+    content = {**made.result, "metrics": {"corr_y_gen": math.nan, "rec_norm": 0.5}}
+    write_json(made.job.model / RESULT, content)
+    found = json.loads((made.job.model / RESULT).read_text(), parse_constant=pytest.fail)
+    assert found["metrics"] == {"corr_y_gen": None, "rec_norm": 0.5}
+    measures = made.result["metrics"]
+    assert (math.isnan(measures["corr_y_gen"]), measures["rec_norm"]) == (True, 0.5)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from svaedc.analysis.aggregation import summarize
+from svaedc.analysis.aggregation import best_of_runs, summarize
 from svaedc.analysis.statistics import holm, sign_flip, student_t
 from svaedc.analysis.summary import Reporting, Row
 
@@ -173,7 +173,24 @@ def test_mean_of_best_so_far_never_falls(f):
 @given(arrays.arrays(float, (3, 5), elements=OBJECTIVE))
 def test_summary_is_strict_json_whatever_failed(f):
     text = json.dumps(summary(rows("ours", f) + rows("theirs", f)).as_json(), allow_nan=False)
-    assert set(json.loads(text)) == {"trials", "purpose", "methods", "differences"}
+    assert set(json.loads(text)) == {"trials", "purpose", "confidence", "methods", "differences"}
+
+
+def test_failed_trials_are_counted_among_all_that_were_made_those_of_incomplete_runs_too():
+    given = [
+        *rows("ours", [[1.0, math.nan, 2.0], [math.nan, math.nan, math.nan]]),
+        Row("ours", 2, 0, math.nan, False),
+    ]
+    ours = summary(given).methods["ours"]
+    assert (ours.runs, ours.incomplete, ours.tried, ours.failed) == (2, 1, 7, 5)
+
+
+def test_the_best_of_runs_are_what_the_summary_averages():
+    f, given = two_methods()
+    runs = best_of_runs([*given, Row("ours", 99, 0, 0.0, success=False)])
+    np.testing.assert_array_equal(runs["ours"], np.maximum.accumulate(f[0], axis=1))
+    means = [estimate.mean for estimate in summary(given).methods["theirs"].best]
+    np.testing.assert_allclose(runs["theirs"].mean(axis=0), means)
 
 
 def test_rows_that_contradict_each_other_are_refused():
