@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from ray.train import ScalingConfig, TrainingFailedError
+from ray.train import RunConfig, ScalingConfig, TrainingFailedError
 from ray.train.torch import TorchTrainer
-from ray.train.v2.api.config import FailureConfig, RunConfig
+from ray.train.v2.api.config import FailureConfig
 
 from cluster.config import TrainSettings
 from cluster.errors import UsageError, UserError
@@ -103,7 +103,7 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
             name=uuid.uuid4().hex,
             storage_path=str(storage),
             failure_config=FailureConfig(max_failures=0, controller_failure_limit=_STARTS),
-            worker_runtime_env={"env_vars": PASSIVE_WAITING},
+            worker_runtime_env={"env_vars": PASSIVE_WAITING},  # type: ignore[call-arg] # of the first version
         ),
     )
     try:
