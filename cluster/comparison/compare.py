@@ -88,11 +88,11 @@ def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mappin
     folder = plan.job.folder
     runs = folder.runs()
     summary = summary_of(plan.job, plan.setup, runs)
-    settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.url}
+    settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.link}
     report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
     for line in lines(summary):
         say(line)
-    say(f"{folder.path / PAGE}; {tracked.run.url}")
+    say(f"{folder.path / PAGE}; {tracked.run.link}")
     asked = set(plan.grid.keys())
     for key, trials in runs.items():
         if key in asked:

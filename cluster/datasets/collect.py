@@ -105,7 +105,7 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
         f"{counts.episodes} new in {duration(counts.seconds)} "
         f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
-        f"{counts.stopped} stopped, {counts.retries} retries; {run.url}"
+        f"{counts.stopped} stopped, {counts.retries} retries; {run.link}"
     )
     run.metrics(counts.metrics() | review(dataset), step=counts.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)

@@ -180,7 +180,7 @@ def _record(points: Sequence[SweepPoint], model: Path, run: Run) -> Path:
         with run.child(result["name"], {"point": result["name"]}) as child:
             child.metrics(_numbers(result), step=0)
     run.file(path)
-    say(f"{path.read_text()}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.url}")
+    say(f"{path.read_text()}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.link}")
     return path
 
 
