@@ -132,7 +132,7 @@ def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:
         for difference in comparison.summary.differences
         if difference.method == OURS and difference.baseline in BASELINES
     ]
-    collapsed = json.loads((folder / "model" / "metrics.json").read_text())["collapsed"]
+    collapsed = json.loads((folder / "model" / "metrics.json").read_text(encoding="utf-8"))["collapsed"]
     if collapsed:
         found.append(f"Note, at this size: {collapsed}")
     places = {

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cluster.cli.output import show
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
 
@@ -34,7 +35,6 @@ def _open(folder: "Location") -> "Dataset":
 @app.command()
 def info(folder: Folder) -> None:
     """What a dataset is and what its episodes are like."""
-    from rich.console import Console
     from rich.table import Table
 
     from cluster.datasets.info import dataset_info
@@ -42,7 +42,7 @@ def info(folder: Folder) -> None:
     table = Table(show_header=False, box=None)
     for name, value in dataset_info(_open(folder)).items():
         table.add_row(name, value)
-    Console().print(table)
+    show(table)
 
 
 @app.command(name="verify")

@@ -131,7 +131,7 @@ def _path(dataset: Dataset) -> Location:
 def _read(dataset: Dataset) -> dict[str, Any]:
     """The plan; nothing when there is none, or one that nobody can read, for it decides nothing."""
     try:
-        plan = json.loads(_path(dataset).read_text())
+        plan = json.loads(_path(dataset).read_text(encoding="utf-8"))
         Forecast.from_json(plan["expected"])
         is_whole = isinstance(plan["episodes"], int) and all(len(entry) == 5 for entry in plan["spent"])
         return plan if is_whole else {}
@@ -143,7 +143,7 @@ def _write(dataset: Dataset, plan: Mapping[str, Any]) -> None:
     """At once, under a name of this process, for a second driver may do the same; a failure costs no data."""
     try:
         with temporary_file(dataset.folder, PLAN) as temporary:
-            temporary.write_text(json.dumps(plan, indent=2) + "\n")
+            temporary.write_text(json.dumps(plan, indent=2) + "\n", encoding="utf-8")
             synchronise(temporary)
             move(temporary, _path(dataset))
     except OSError as error:

@@ -24,9 +24,8 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
     """
     path = _path(dataset, shard)
     path.parent.mkdir(exist_ok=True)
-    path.write_text(
-        json.dumps({"start": shard.start, "stop": shard.stop, "errors": list(errors)}, indent=2) + "\n"
-    )
+    content = {"start": shard.start, "stop": shard.stop, "errors": list(errors)}
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     return path
 
 

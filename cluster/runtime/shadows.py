@@ -10,7 +10,9 @@ from cluster.errors import UserError
 
 NEEDED = frozenset(
     {"cluster", "svaedc", "workers"}
-    | {"botorch", "gpytorch", "linear_operator", "pyarrow", "pybullet", "pybullet_data", "torch"}
+    | {"botorch", "gpytorch", "jaxtyping", "linear_operator", "numpy", "pyarrow", "pybullet", "pybullet_data"}
+    | {"colorful", "fsspec", "matplotlib", "mpmath", "multipledispatch", "networkx", "PIL", "scipy", "sympy"}
+    | {"threadpoolctl", "torch", "torchgen", "typing_inspect"}
 )
 """Ray's processes load these, whatever this one has loaded; so they do much of the standard library."""
 UNUSED = frozenset({"antigravity", "idlelib", "test", "this", "tkinter", "turtle", "turtledemo"})
