@@ -107,8 +107,8 @@ class TrainSettings(Section):
     time_limit_seconds: Limit = inf
     """Training stops after the epoch in which this passes."""
     cache_folder: UserPath = Field(default_factory=cache_folder)
-    """Shards are decoded here into one memory-mapped array, once per dataset; by default in `~/.cache/svaedc`,
-    or, where the home is unknown or read-only, in `svaedc-UID` in the folder of temporary files."""
+    """Shards are decoded here into one memory-mapped array, once per dataset: in `~/.cache/svaedc`, or, where
+    the home is unknown or read-only, in `svaedc-UID` in the folder of temporary files."""
     checkpoint_every_epochs: PositiveInt = 1
     """An interruption may cost so many epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"

@@ -9,14 +9,14 @@ from typing import ClassVar
 class ExitCode(IntEnum):
     """How a command ended.
 
-    | code | name          | when                                                                             |
-    |------|---------------|----------------------------------------------------------------------------------|
-    | 0    | `DONE`        | it did what was asked, or all of that was done before                            |
-    | 1    | `FAILED`      | something stands in the way, or was found wrong: the message says what to do     |
-    | 2    | `USAGE`       | the command line or the settings ask for what does not exist; nothing was begun  |
-    | 130  | `INTERRUPTED` | Ctrl-C; what is finished is kept                                                 |
-    | 141  | `UNREAD`      | whoever read its output left before the end, as `head` does                      |
-    | 143  | `TERMINATED`  | SIGTERM (`ray job stop`, a service manager); what is finished is kept            |
+    | code | name          | when                                                                            |
+    |------|---------------|---------------------------------------------------------------------------------|
+    | 0    | `DONE`        | it did what was asked, or all of that was done before                           |
+    | 1    | `FAILED`      | something stands in the way, or was found wrong: the message says what to do    |
+    | 2    | `USAGE`       | the command line or the settings ask for what does not exist; nothing was begun |
+    | 130  | `INTERRUPTED` | Ctrl-C; what is finished is kept                                                |
+    | 141  | `UNREAD`      | whoever read its output left before the end, as `head` does                     |
+    | 143  | `TERMINATED`  | SIGTERM (`ray job stop`, a service manager); what is finished is kept           |
 
     Code 1 with a traceback is a mistake in this program. The system adds codes of its own: 137 is a process
     that was killed outright, most often because memory was short.

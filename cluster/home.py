@@ -1,4 +1,4 @@
-"""The user's home, which a container may lack: no HOME, a user without a name, or nothing that can be written."""
+"""The user's home, which a container may lack: no HOME, a user without a name, or a read-only one."""
 
 import os
 import tempfile
@@ -19,17 +19,35 @@ def expand_home(path: Path) -> Path:
         ) from error
 
 
+def require_home() -> None:
+    """Let libraries have a home where the system knows of none: MLflow cannot even be imported without.
+
+    It is a folder of this user's beside the temporary files, also for the processes that are started later.
+    """
+    try:
+        Path.home()
+    except RuntimeError:
+        home = _substitute()
+        home.mkdir(mode=0o700, exist_ok=True)
+        if home.stat().st_uid != os.getuid():  # somebody else was here first
+            home = Path(tempfile.mkdtemp(prefix="svaedc-"))
+        os.environ["HOME"] = str(home)
+
+
 def cache_folder() -> Path:
     """`~/.cache/svaedc`; where that cannot be made, a folder of this user's beside the temporary files."""
-    elsewhere = Path(tempfile.gettempdir()) / f"svaedc-{os.getuid()}"
     try:
         usual = expand_home(Path("~/.cache/svaedc"))
     except ValueError:
-        return elsewhere
-    return usual if _is_writable(usual) else elsewhere
+        return _substitute()
+    return usual if is_writable(usual) else _substitute()
 
 
-def _is_writable(folder: Path) -> bool:
+def _substitute() -> Path:
+    return Path(tempfile.gettempdir()) / f"svaedc-{os.getuid()}"
+
+
+def is_writable(folder: Path) -> bool:
     """Whether files can be made in a folder, which itself need not exist yet."""
     place = folder
     while not os.path.exists(place) and place != place.parent:  # noqa: PTH110 - Path.exists raises where denied

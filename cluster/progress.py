@@ -65,7 +65,9 @@ class ProgressLine:
         self._total = max(self._total, self.done)  # some work is found on the way
         self._note = note
         if self._bar and self._task is not None:
-            self._bar.update(self._task, advance=count, total=self._total, note=f"{_per_second(self.rate)}  {note}")
+            self._bar.update(
+                self._task, advance=count, total=self._total, note=f"{_per_second(self.rate)}  {note}"
+            )
         elif time.monotonic() - self._logged > _LOG_SECONDS:
             self._logged = time.monotonic()
             self._log(f"{self._time_left()} left")

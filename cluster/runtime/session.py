@@ -110,6 +110,7 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster; a busy machine may need longer than the half minute that Ray grants itself."""
     require_short_paths(settings, parts)
     ray_internals.stay_on_loopback()
+    ray_internals.lend_token()
     _bound_logs(settings.log_file_bytes)
     for further in reversed(range(ATTEMPTS)):
         try:

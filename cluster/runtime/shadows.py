@@ -1,4 +1,4 @@
-"""Files of a user's that take the place of libraries: Ray's processes look into the working directory first."""
+"""Files of a user's that hide libraries: Ray's processes look into the working directory first."""
 
 import inspect
 import sys
@@ -20,7 +20,7 @@ UNUSED = frozenset({"antigravity", "idlelib", "test", "this", "tkinter", "turtle
 
 
 def require_no_shadows(folder: Path) -> None:
-    """Refuses a folder with a file in which Ray's processes would find something else than a library.
+    """Refuses a folder with a file that Ray's processes would take for a library.
 
     Nothing is imported: the file's name is enough.
 
@@ -37,6 +37,20 @@ def require_no_shadows(folder: Path) -> None:
         )
 
 
+def require_own_packages() -> None:
+    """Ends a command that would load a user's `workers` or `svaedc` for the packages of these names.
+
+    That is so where PYTHONPATH names the folder of such a file, and under `python -m`.
+    """
+    installed = Path(__file__).parents[2]
+    for name in ("svaedc", "workers"):
+        place = _place(name)
+        if place and not Path(place).resolve().is_relative_to(installed.resolve()):
+            sys.exit(
+                f"error: {place} hides {installed / name}: rename it, or take its folder out of PYTHONPATH"
+            )
+
+
 def _shadows(folder: Path) -> Iterator[tuple[Path, str]]:
     """Files and packages in a folder, each with the library of its name that lies elsewhere."""
     for path in sorted(folder.iterdir()):
@@ -48,7 +62,7 @@ def _shadows(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _module_name(path: Path) -> str:
-    """What `import` finds there; "" for nothing that could hide a library, as folders without `__init__.py`."""
+    """What `import` finds there; "" for what hides nothing, as a folder without `__init__.py`."""
     if not path.is_dir():
         return inspect.getmodulename(path) or ""
     is_package = any(inspect.getmodulename(each) == "__init__" for each in path.glob("__init__.*"))

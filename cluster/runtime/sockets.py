@@ -1,4 +1,4 @@
-"""Sockets of a cluster that is started here: a path that Linux finds too long is refused before Ray starts."""
+"""Sockets of a cluster that is started here: a path too long for Linux is refused before Ray starts."""
 
 import os
 import tempfile
@@ -33,7 +33,11 @@ def require_short_paths(settings: RaySettings, parts: tuple[Part, ...]) -> None:
         "name one of at most {room} with --set ray.temporary_folder=DIR",
     )
     if "dashboard" in parts:
-        _require(Path(tempfile.gettempdir()), _IN_TEMPORARY_FILES, "set TMPDIR to one of at most {room}, such as /tmp")
+        _require(
+            Path(tempfile.gettempdir()),
+            _IN_TEMPORARY_FILES,
+            "set TMPDIR to one of at most {room}, such as /tmp",
+        )
 
 
 def _require(folder: Path, below: str, remedy: str) -> None:
@@ -41,6 +45,6 @@ def _require(folder: Path, below: str, remedy: str) -> None:
     length = len(os.fsencode(folder))
     if length > room:
         raise UserError(
-            f"Ray cannot start here: its sockets lie below {folder}, a path of {length} bytes, and theirs may "
-            f"have {LONGEST} in all; {remedy.format(room=room)}"
+            f"Ray cannot start here: its sockets lie below {folder}, a path of {length} bytes, and theirs "
+            f"may have {LONGEST} in all; {remedy.format(room=room)}"
         )

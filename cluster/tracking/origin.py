@@ -12,8 +12,8 @@ DESCRIPTIONS: Final = {
     "collect": "Simulated episodes of random controllers, collected into a dataset.",
     "plan": "The first few shards of a dataset, and what all of it will cost.",
     "train": "A model of a dataset: the latent space in which Bayesian optimisation runs.",
-    "sweep": "Models around a preset, ranked by a cheap proxy of what they are worth for Bayesian optimisation.",
-    "compare": "Methods of Bayesian optimisation side by side in simulation, one run beneath this for each seed.",
+    "sweep": "Models around a preset, ranked by a cheap proxy of their worth for Bayesian optimisation.",
+    "compare": "Methods of Bayesian optimisation side by side in simulation, with a run for each seed.",
     "hardware": "A campaign on one robot: random trials first, then suggested ones.",
     "child": "One of the runs that the run above this one is made of.",
 }

@@ -56,7 +56,7 @@ def open_tracker(settings: TrackingSettings) -> Tracker:
 def _address(database: Path) -> str:
     """What SQLAlchemy reads as this file, whatever its path holds.
 
-    The driver is named because MLflow takes what follows a bare `sqlite:///` for a path, and makes its folder.
+    The driver is named because MLflow takes what follows a bare `sqlite:///` for a path and makes its folder.
 
     Raises:
         UnicodeError: the path is not text in the system's encoding, and MLflow could not find it again.

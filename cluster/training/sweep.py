@@ -180,7 +180,8 @@ def _record(points: Sequence[SweepPoint], model: Path, run: Run) -> Path:
         with run.child(result["name"], {"point": result["name"]}) as child:
             child.metrics(_numbers(result), step=0)
     run.file(path)
-    say(f"{path.read_text(encoding='utf-8')}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.link}")
+    table = path.read_text(encoding="utf-8")
+    say(f"{table}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.link}")
     return path
 
 
