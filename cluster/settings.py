@@ -40,8 +40,8 @@ def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
         raise UsageError(f"{origin}: " + "; ".join(_complaints(error))) from error
 
 
-class _RepeatedKeyError(yaml.MarkedYAMLError):
-    """A key stands twice in one mapping."""
+class _RepeatedKeyError(yaml.YAMLError):
+    """A key stands twice in one mapping; the text says where."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -54,8 +54,10 @@ class _Loader(yaml.SafeLoader):
         for key, _ in node.value:
             line = key.start_mark.line + 1
             if isinstance(key, yaml.ScalarNode) and first.setdefault((key.tag, key.value), line) != line:
-                problem = f"{key.value!r} stands in line {first[key.tag, key.value]} already; leave one out"
-                raise _RepeatedKeyError(problem=problem, problem_mark=key.start_mark)
+                earlier = first[key.tag, key.value]
+                raise _RepeatedKeyError(
+                    f"line {line}: {key.value!r} stands in line {earlier} already; leave one out"
+                )
         return node
 
 
@@ -68,7 +70,7 @@ def _sections(path: Path) -> dict[str, Any]:
             f"cannot read the settings file {path}: {error.strerror}; give an existing file to --config"
         ) from error
     except _RepeatedKeyError as error:
-        raise UsageError(f"{path}, line {error.problem_mark.line + 1}: {error.problem}") from error
+        raise UsageError(f"{path}, {error}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise UsageError(f"{path} is not YAML: {error}") from error
     metadata = _mapping(document, path, "the file").get("metadata")

@@ -85,7 +85,7 @@ def main() -> None:
 def _run() -> int:
     """The exit code of a command."""
     try:
-        return _command()(standalone_mode=False) or ExitCode.DONE
+        return _command_line()(standalone_mode=False) or ExitCode.DONE
     except TyperException as error:
         if error.format_message():  # not where the help has been printed
             say(f"error: {error.format_message()}{_remedy(error)}")
@@ -98,7 +98,7 @@ def _run() -> int:
         return ExitCode.FAILED
 
 
-def _command() -> Any:
+def _command_line() -> Any:
     """The command line as typer makes it, but for the help of two options."""
     command: Any = typer.main.get_command(app)
     for option in command.params:

@@ -32,8 +32,8 @@ def require_no_shadows(folder: Path) -> None:
     """
     for path, hidden in _shadows(folder):
         raise UserError(
-            f"{path} hides {hidden} from the processes that Ray starts, which look for modules in the working "
-            "directory first: rename it, or start the command in another folder"
+            f"{path} hides {hidden} from the processes that Ray starts, which look for modules in the "
+            "working directory first: rename it, or start the command in another folder"
         )
 
 

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from mlflow import MlflowClient
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
@@ -77,7 +78,7 @@ def test_a_link_into_a_file_is_followed_by_the_command_that_shows_it(tmp_path, m
 
 
 def test_a_link_to_a_server_stands_alone():
-    tracker = Tracker(client=None, uri="https://tracker:5000", experiment="7")
+    tracker = Tracker(MlflowClient("https://tracker:5000"), "https://tracker:5000", experiment="7")
     assert Run(tracker, "123").link == "https://tracker:5000/#/experiments/7/runs/123"
 
 
