@@ -132,7 +132,7 @@ def worker(config):
         "ours": (joint[-1] - joint[0]) / (job.updates - UPDATES),
         "plain": plain(episodes(cache), shortened(job.settings(cache))),
     }
-    (job.model / "seconds.json").write_text(json.dumps(seconds))
+    (job.model / "seconds.json").write_text(json.dumps(seconds), encoding="utf-8")
     ray.train.report({})
 
 
@@ -166,7 +166,7 @@ def under_ray(folder, session):
         scaling_config=ScalingConfig(num_workers=1),
         run_config=RunConfig(storage_path=str(folder / "ray")),
     ).fit()
-    found = json.loads((job.model / "seconds.json").read_text())
+    found = json.loads((job.model / "seconds.json").read_text(encoding="utf-8"))
     return found["ours"], found["plain"], plain(episodes(job.data()), shortened(job.settings(job.data())))
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     NonNegativeFloat,
@@ -19,9 +20,21 @@ from pydantic import (
     PositiveInt,
 )
 
-UserPath = Annotated[Path, AfterValidator(Path.expanduser)]
+from cluster.home import cache_folder, expand_home
+
+SQLITE = "sqlite:///"
+
+UserPath = Annotated[Path, AfterValidator(expand_home)]
 """A leading `~` of such a path stands for the user's home."""
 
+
+def _infinity(text: object) -> object:
+    """Without YAML's point, which plain text has as well."""
+    return "inf" if text == ".inf" else text
+
+
+Limit = Annotated[PositiveFloat, BeforeValidator(_infinity)]
+"""It may be infinite."""
 
 Part = Literal["dashboard"]
 """A cluster started by a command may do without this: the dashboard, which Ray Train queries all the time."""
@@ -93,10 +106,11 @@ class TrainSettings(Section):
     """Each stage makes so many gradient updates; fewer train faster and worse."""
     stride: PositiveInt | Literal["preset"] = "preset"
     """The model sees one of so many control steps: 5 in the preset `compact`, 1 in `paper`."""
-    time_limit_seconds: PositiveFloat = inf
+    time_limit_seconds: Limit = inf
     """Training stops after the epoch in which this passes."""
-    cache_folder: UserPath = Path("~/.cache/svaedc").expanduser()
-    """Shards are decoded here into one memory-mapped array, once per dataset."""
+    cache_folder: UserPath = Field(default_factory=cache_folder)
+    """Shards are decoded here into one memory-mapped array, once per dataset: in `~/.cache/svaedc`, or, where
+    the home is unknown or read-only, in `svaedc-UID` in the folder of temporary files."""
     checkpoint_every_epochs: PositiveInt = 1
     """An interruption may cost so many epochs."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
@@ -160,13 +174,29 @@ class HardwareSettings(Section):
     """The one hardware actor is in this Ray namespace, the same for everybody who shares the robot."""
 
 
+def _store(uri: str) -> str:
+    """The same, with the name of its file as the disk knows it."""
+    if not uri.startswith(SQLITE):
+        return uri
+    name = uri.removeprefix(SQLITE)
+    if not name or name.endswith("/"):
+        raise ValueError(f"{SQLITE}FILE must name a file")
+    return f"{SQLITE}{expand_home(Path(name))}"
+
+
 class TrackingSettings(Section):
     """Where MLflow keeps the runs."""
 
-    uri: str = Field(default="sqlite:///mlflow.db", min_length=1)
-    """This is `sqlite:///FILE` (relative to the working directory) or the address of an MLflow server."""
+    uri: Annotated[str, AfterValidator(_store)] = Field(default=f"{SQLITE}mlflow.db", min_length=1)
+    """This is `sqlite:///FILE` or the address of an MLflow server. FILE is a path, relative to the working
+    directory, in which no character has a meaning of its own."""
     experiment: str = Field(default="svaedc", min_length=1)
     """This MLflow experiment holds the runs."""
+
+    @property
+    def file(self) -> Path | None:
+        """The SQLite file; None where `uri` is a server's address."""
+        return Path(self.uri.removeprefix(SQLITE)) if self.uri.startswith(SQLITE) else None
 
 
 class Settings(Section):
@@ -174,7 +204,7 @@ class Settings(Section):
 
     ray: RaySettings = RaySettings()
     collect: CollectSettings = CollectSettings()
-    train: TrainSettings = TrainSettings()
+    train: TrainSettings = Field(default_factory=TrainSettings)
     compare: CompareSettings = CompareSettings()
     hardware: HardwareSettings = HardwareSettings()
     tracking: TrackingSettings = TrackingSettings()

@@ -79,7 +79,7 @@ def demo(
         "and proves nothing about the methods."
     )
     [comparison] = run_steps(reproduction, settings, session, tracker, STEPS).values()
-    say(conclusion(folder, comparison, f"svaedc ui --set tracking.uri={tracker.uri}"))
+    say(conclusion(folder, comparison, tracker.viewer))
     return comparison
 
 
@@ -122,7 +122,7 @@ def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:
     Args:
         folder: of the demo.
         comparison: its last stage.
-        viewer: the command that serves the comparison's MLflow run.
+        viewer: the command that serves the comparison's MLflow run; "" where a server does already.
 
     Returns:
         Text of several lines.
@@ -132,7 +132,7 @@ def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:
         for difference in comparison.summary.differences
         if difference.method == OURS and difference.baseline in BASELINES
     ]
-    collapsed = json.loads((folder / "model" / "metrics.json").read_text())["collapsed"]
+    collapsed = json.loads((folder / "model" / "metrics.json").read_text(encoding="utf-8"))["collapsed"]
     if collapsed:
         found.append(f"Note, at this size: {collapsed}")
     places = {
@@ -141,7 +141,7 @@ def conclusion(folder: Path, comparison: Comparison, viewer: str) -> str:
         "dataset": folder / "dataset",
         "model": folder / "model" / "model.pt",
         "its picture": folder / "model" / "reconstruction.png",
-        "MLflow run": f"{comparison.url} (served by: {viewer})",
+        "MLflow run": f"{comparison.url}{viewer and f' (served by: {viewer})'}",
     }
     return "\n".join([*found, *(f"  {name:<11} {place}" for name, place in places.items())])
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from cluster.errors import UsageError, UserError
+from cluster.home import expand_home
 from workers.setups.names import SETUPS
 
 if TYPE_CHECKING:
@@ -31,7 +32,8 @@ def durable(path: Path | None) -> Path | None:
             "give an absolute path that every machine of the cluster sees, or, for a campaign on hardware, "
             "one on a local disk of the robot's machine"
         )
-    return path.expanduser().absolute()
+    with usage_errors():
+        return expand_home(path).absolute()
 
 
 def dataset_location(text: str) -> "Location":
@@ -49,7 +51,10 @@ def dataset_location(text: str) -> "Location":
         place = location(text)
     except ValueError as error:
         raise UsageError(str(error)) from error
-    return place.expanduser() if isinstance(place, Path) else place.at(_store_of_environment())
+    if not isinstance(place, Path):
+        return place.at(_store_of_environment())
+    with usage_errors():
+        return expand_home(place)
 
 
 def _store_of_environment() -> dict[str, str]:

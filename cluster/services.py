@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from cluster.config import Part, Settings
 from cluster.inputs import durable
@@ -28,9 +27,7 @@ def services(
         UsageError: the store would be deleted with a job's copy of the working directory.
         UserError: the store or the cluster cannot be used.
     """
-    store = settings.tracking.uri.removeprefix("sqlite:///")
-    if store != settings.tracking.uri:
-        durable(Path(store))
+    durable(settings.tracking.file)
     tracker = open_tracker(settings.tracking)
     with connect(settings.ray, address, parts) as session:
         yield session, tracker

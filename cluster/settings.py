@@ -21,13 +21,14 @@ def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
         path: the file given with `--config`, which must exist; without one, `ray_config.yaml` of the working
             directory is read if it is there.
         overrides: `section.key=value` texts of `--set`, the later over the earlier and all over the file; the
-            value is a YAML scalar.
+            value is plain text, in which nothing has a meaning of its own.
 
     Returns:
         All sections, with the defaults of what is not given.
 
     Raises:
-        UsageError: the file is absent or unreadable, a key is unknown, or a value is out of its range.
+        UsageError: the file is absent or unreadable, a key is unknown or stands twice, or a value is out of
+            its range.
     """
     sections = _sections(path if path is not None else DEFAULT_FILE) if path or DEFAULT_FILE.exists() else {}
     for override in overrides:
@@ -39,14 +40,37 @@ def load_settings(path: Path | None, overrides: Sequence[str]) -> Settings:
         raise UsageError(f"{origin}: " + "; ".join(_complaints(error))) from error
 
 
+class _RepeatedKeyError(yaml.YAMLError):
+    """A key stands twice in one mapping; the text says where."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that stands twice in one mapping, as YAML does; PyYAML alone takes the last one."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        """The mapping, if all its keys are different."""
+        node = super().compose_mapping_node(anchor)
+        first: dict[tuple[str, str], int] = {}
+        for key, _ in node.value:
+            line = key.start_mark.line + 1
+            if isinstance(key, yaml.ScalarNode) and first.setdefault((key.tag, key.value), line) != line:
+                earlier = first[key.tag, key.value]
+                raise _RepeatedKeyError(
+                    f"line {line}: {key.value!r} stands in line {earlier} already; leave one out"
+                )
+        return node
+
+
 def _sections(path: Path) -> dict[str, Any]:
     """The content of `metadata.svaedc`; a section in which everything is commented out reads as empty."""
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise UsageError(
             f"cannot read the settings file {path}: {error.strerror}; give an existing file to --config"
         ) from error
+    except _RepeatedKeyError as error:
+        raise UsageError(f"{path}, {error}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise UsageError(f"{path} is not YAML: {error}") from error
     metadata = _mapping(document, path, "the file").get("metadata")
@@ -68,11 +92,7 @@ def _apply(override: str, sections: dict[str, Any]) -> None:
     section, dot, key = name.strip().partition(".")
     if not (equals and dot and section and key):
         raise UsageError(f"--set takes section.key=value, such as train.workers=2, got {override!r}")
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise UsageError(f"--set {name}: {text!r} is not a YAML value") from error
-    sections.setdefault(section, {})[key] = value
+    sections.setdefault(section, {})[key] = text.strip()
 
 
 def _complaints(error: ValidationError) -> Iterator[str]:

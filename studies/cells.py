@@ -31,7 +31,7 @@ class Study:
         """Results by cell; a line that was cut off in the middle counts as not computed."""
         path = self.folder / "cells.jsonl"
         found = {}
-        for line in path.read_text().splitlines() if path.exists() else ():
+        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
             try:
                 entry = json.loads(line)
             except ValueError:
@@ -41,7 +41,7 @@ class Study:
 
     def keep(self, cell: Any, result: Result) -> None:
         """Add a result at the end, on a line of its own, and wait until the disk has it."""
-        with (self.folder / "cells.jsonl").open("a") as file:
+        with (self.folder / "cells.jsonl").open("a", encoding="utf-8") as file:
             file.write("\n" * (file.tell() > 0) + json.dumps({"cell": asdict(cell), "result": result}))
             file.flush()
             os.fsync(file.fileno())
@@ -128,5 +128,5 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def written(path: Path, text: str) -> None:
     """Keep a text, and show it."""
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     sys.stdout.write(text)

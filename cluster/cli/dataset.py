@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cluster.cli.documents import one_document
+from cluster.cli.output import show
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable
 from svaedc.analysis.words import quantity
@@ -52,7 +53,6 @@ def info(folder: Folder, *, as_json: AsJson = False) -> None:
         with one_document() as document:
             document |= dataset_facts(_open(folder))
         return
-    from rich.console import Console
     from rich.table import Table
 
     from cluster.datasets.info import dataset_info
@@ -60,7 +60,7 @@ def info(folder: Folder, *, as_json: AsJson = False) -> None:
     table = Table(show_header=False, box=None)
     for name, value in dataset_info(_open(folder)).items():
         table.add_row(name, value)
-    Console().print(table)
+    show(table)
 
 
 @app.command(name="verify")

@@ -1,6 +1,5 @@
 """`svaedc demo`: the whole pipeline, small and real."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -22,8 +21,6 @@ def demo(
     from cluster.demo import demo as run_demo
 
     folder.mkdir(parents=True, exist_ok=True)
-    # Quoted, because a folder's name may mean something in YAML.
-    store = json.dumps(f"sqlite:///{folder / 'mlflow.db'}")
-    settings = settings_of(config, [f"tracking.uri={store}", *(overrides or [])])
+    settings = settings_of(config, [f"tracking.uri=sqlite:///{folder / 'mlflow.db'}", *(overrides or [])])
     with services(settings, address) as (session, tracker):
         run_demo(folder, settings, session, tracker)

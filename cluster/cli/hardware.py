@@ -7,6 +7,7 @@ import typer
 
 from cluster.cli.documents import one_document
 from cluster.cli.options import Address, Config, Overrides, Seed, TrainedModel, services, settings_of
+from cluster.cli.output import show
 from cluster.hardware.states import Approval
 from cluster.inputs import durable
 from cluster.progress import say
@@ -139,13 +140,12 @@ def _report(now: "Status") -> None:
 
 
 def _show(now: "Status") -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table("trial", "state", "kind", "f", "y", title=f"{now.name}: {now.phase}", title_justify="left")
     for trial in now.trials:
         f, y = ("" if value is None else f"{value:+.3f}" for value in (trial.f, trial.y))
         table.add_row(str(trial.number), str(trial.state), trial.kind, f, y)
-    Console().print(table)
+    show(table)
     if now.advice:
         say(now.advice)

@@ -7,6 +7,7 @@ import typer
 
 from cluster.cli.options import Address, Config, Overrides, services, settings_of
 from cluster.errors import UsageError
+from cluster.home import expand_home
 from cluster.inputs import durable, durable_dataset, usage_errors
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def reproduce(
     _require_consistent(settings, dataset, episodes)
     with usage_errors():
         recipe, size = paper_figures.recipe(figure), scales.scale(scale)
+        models = tuple(expand_home(path).absolute() for path in model or ())
     reproduction = resolve(
         recipe,
         size,
@@ -80,7 +82,7 @@ def reproduce(
         episodes=episodes or size.episodes.get(recipe.data, 0),
         runs=runs or recipe.runs,
         dataset=dataset,
-        models=tuple(path.expanduser().absolute() for path in model or ()),
+        models=models,
     )
     if plan:
         _say_cost(reproduction, settings, address)

@@ -95,7 +95,7 @@ def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mappin
     folder = plan.job.folder
     runs = folder.runs()
     summary = summary_of(plan.job, plan.setup, runs)
-    settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.url}
+    settings = {**parameters, **run_parameters(runs), "MLflow run": tracked.run.link}
     keys = plan.grid.keys()
     report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption, keys)
     for line in lines(summary):
@@ -104,7 +104,7 @@ def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mappin
         say(missing)
     for path in folder.failures()[:1]:
         say(f"trials failed; what the first of them failed of is in {path}")
-    say(f"{folder.path / PAGE}; {tracked.run.url}")
+    say(f"{folder.path / PAGE}; {tracked.run.link}")
     asked = set(keys)
     for key, trials in runs.items():
         if key in asked:

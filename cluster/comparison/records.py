@@ -19,6 +19,7 @@ from cluster.errors import UserError
 from cluster.files import json_text, replacing
 from svaedc.analysis.summary import Row
 from svaedc.bo.loop import Trial
+from workers.dataset.storage.location import arrow_name
 
 RUNS = "runs"
 NAME = re.compile(r"(?P<method>.+)-(?P<run>\d{5,})\.jsonl")
@@ -125,7 +126,7 @@ def write_table(path: Path, runs: Runs, facts: Mapping[str, str]) -> None:
         for trial in trials
     ]
     with replacing(path) as unfinished:
-        pq.write_table(pa.Table.from_pylist(records), unfinished, compression="zstd")
+        pq.write_table(pa.Table.from_pylist(records), arrow_name(unfinished), compression="zstd")
 
 
 def _fields(trial: Trial) -> dict[str, Any]:

@@ -120,7 +120,7 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
         f"{counts.episodes} new in {duration(counts.seconds)} "
         f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
-        f"{counts.stopped} stopped, {counts.failed_text}{counts.retries} retries; {run.url}"
+        f"{counts.stopped} stopped, {counts.failed_text}{counts.retries} retries; {run.link}"
     )
     for note in notes(dataset):
         say(f"note: {note}")

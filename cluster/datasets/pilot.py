@@ -132,7 +132,7 @@ def _path(dataset: Dataset) -> Location:
 def _read(dataset: Dataset) -> dict[str, Any]:
     """The plan; nothing when there is none, or one that nobody can read, for it decides nothing."""
     try:
-        plan = json.loads(_path(dataset).read_text())
+        plan = json.loads(_path(dataset).read_text(encoding="utf-8"))
         Forecast.from_json(plan["expected"])
         is_whole = isinstance(plan["episodes"], int) and all(len(entry) == 5 for entry in plan["spent"])
         return plan if is_whole else {}
@@ -144,7 +144,7 @@ def _write(dataset: Dataset, plan: Mapping[str, Any]) -> None:
     """At once, under a name of this process, for a second driver may do the same; a failure costs no data."""
     try:
         with temporary_file(dataset.folder, PLAN) as temporary:
-            temporary.write_text(json_text(plan) + "\n")
+            temporary.write_text(json_text(plan) + "\n", encoding="utf-8")
             synchronise(temporary)
             move(temporary, _path(dataset))
     except OSError as error:

@@ -31,7 +31,7 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
     path = _path(dataset, shard)
     path.parent.mkdir(exist_ok=True)
     content = {"start": shard.start, "stop": shard.stop, "errors": list(errors)}
-    path.write_text(json_text(content) + "\n")
+    path.write_text(json_text(content) + "\n", encoding="utf-8")
     return path
 
 
@@ -50,7 +50,10 @@ def keep_account(dataset: Dataset, failed: FailedEpisode) -> Location:
     identity = dataset.identity
     what = f"episode {failed.index} of seed {identity.seed}"
     failure = Failure(failed.reason, failed.text)
-    path.write_text(failure_text(what, identity.setup, identity.bad_name, failed.x, failed.physics, failure))
+    path.write_text(
+        failure_text(what, identity.setup, identity.bad_name, failed.x, failed.physics, failure),
+        encoding="utf-8",
+    )
     return path
 
 

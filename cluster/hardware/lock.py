@@ -36,7 +36,7 @@ class Process:
     @classmethod
     def current(cls) -> "Process":
         """The process that asks."""
-        boot = BOOT_ID.read_text().strip() if BOOT_ID.exists() else ""
+        boot = BOOT_ID.read_text(encoding="utf-8").strip() if BOOT_ID.exists() else ""
         return cls(socket.gethostname(), boot, os.getpid())
 
     def __str__(self) -> str:
@@ -58,7 +58,7 @@ class FolderLock:
 
     def __init__(self, folder: Path, patience: float) -> None:
         path = folder / FILE
-        self._file = path.open("a+")
+        self._file = path.open("a+", encoding="utf-8")
         deadline = time.monotonic() + patience
         while not _try_lock(self._file.fileno()):
             if time.monotonic() >= deadline:
@@ -87,7 +87,7 @@ def holder(folder: Path) -> Process | None:
     path = folder / FILE
     if not path.exists():
         return None
-    with path.open() as file:
+    with path.open(encoding="utf-8") as file:
         try:
             # A shared lock asks without getting in the way of others who ask.
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cluster.errors import UsageError, UserError
+from cluster.home import expand_home
 from cluster.inputs import dataset_location
 from workers.controllers.controller import unit_cube
 from workers.dataset.folder import Dataset, open_dataset
@@ -75,7 +76,7 @@ def _whole(wanted: str, text: str, name: str) -> int:
 def _controller(wanted: str, setup: Setup) -> np.ndarray:
     with _errors_named(wanted, setup):
         if wanted.endswith(".npy"):
-            return unit_cube(np.load(Path(wanted).expanduser(), allow_pickle=False), setup.dimensions)
+            return unit_cube(np.load(expand_home(Path(wanted)), allow_pickle=False), setup.dimensions)
         return unit_cube([float(number) for number in wanted.split(",")], setup.dimensions)
 
 

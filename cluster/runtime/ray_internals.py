@@ -7,12 +7,16 @@ is watched over, by the raylet and the head alone. `docs/benchmarks.md` says wha
 """
 
 import os
+import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from ray._private import ray_constants, services, state, worker
 from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
+
+from cluster.home import is_writable
 
 SETTINGS: Mapping[str, Any] = {
     # Counters that every process exports every ten seconds, for the dashboard and Prometheus.
@@ -104,6 +108,13 @@ def use_token() -> None:
     if "RAY_AUTH_MODE" not in os.environ and loader.has_token(ignore_auth_mode=True):
         os.environ["RAY_AUTH_MODE"] = "token"
         Config.initialize("")
+
+
+def lend_token() -> None:
+    """Gives a cluster that ends with this process a token in memory if the home takes none, as Ray would."""
+    loader = AuthenticationTokenLoader.instance()
+    if not loader.has_token(ignore_auth_mode=True) and not is_writable(Path.home() / ".ray"):
+        os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
 
 
 def stay_on_loopback() -> None:

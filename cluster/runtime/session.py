@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import ray
@@ -16,7 +17,9 @@ from ray.exceptions import AuthenticationError, RaySystemError, RpcError
 from cluster.config import Part, RaySettings
 from cluster.errors import UsageError, UserError
 from cluster.runtime import ray_internals
+from cluster.runtime.shadows import require_no_shadows
 from cluster.runtime.signals import terminating_as_exit
+from cluster.runtime.sockets import require_short_paths
 
 LOOPBACK = "127.0.0.1"
 ATTEMPTS = 3
@@ -79,9 +82,11 @@ def connect(
         The connected cluster.
 
     Raises:
-        UserError: the cluster is unreachable, refuses the token, or cannot be started.
+        UserError: the cluster is unreachable, refuses the token, or cannot be started; or a file in the
+            working directory hides a library.
         UsageError: the address is malformed.
     """
+    require_no_shadows(Path.cwd())
     wanted = address or os.environ.get("RAY_ADDRESS")
     if wanted:
         _join(settings, wanted)
@@ -103,7 +108,9 @@ def _session(*, is_local: bool) -> Session:
 
 def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster; a busy machine may need longer than the half minute that Ray grants itself."""
+    require_short_paths(settings, parts)
     ray_internals.stay_on_loopback()
+    ray_internals.lend_token()
     _bound_logs(settings.log_file_bytes)
     for further in reversed(range(ATTEMPTS)):
         try:

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from cluster.errors import ExitCode
 from cluster.progress import say
-
-_TERMINATED = 128 + signal.SIGTERM
 
 
 @contextmanager
@@ -29,7 +28,7 @@ def terminating_as_exit() -> Iterator[None]:
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         terminated.set()
-        raise SystemExit(_TERMINATED)
+        raise SystemExit(ExitCode.TERMINATED)
 
     # A compiled library may have put a handler of its own beneath Python's, which then never runs: MLflow
     # imports Polars where it is installed, and that swallows Ctrl-C. Setting Python's again takes it back.
@@ -39,14 +38,12 @@ def terminating_as_exit() -> Iterator[None]:
         yield
     except (KeyboardInterrupt, SystemExit):
         if terminated.is_set():
-            raise SystemExit(_TERMINATED) from None
+            raise SystemExit(ExitCode.TERMINATED) from None
         raise
     finally:
         signal.signal(signal.SIGTERM, previous)
 
 
-INTERRUPTED = 130
-"""A command ends with this exit code after Ctrl-C."""
 KEPT = "everything finished is kept, and the same command goes on from here"
 """Stopping means this for nearly all commands."""
 
@@ -62,4 +59,4 @@ def interruptible(consequence: str = KEPT) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, SystemExit) as stop:
         say(f"stopped: {consequence}")
-        raise SystemExit(stop.code if isinstance(stop, SystemExit) else INTERRUPTED) from None
+        raise SystemExit(stop.code if isinstance(stop, SystemExit) else ExitCode.INTERRUPTED) from None

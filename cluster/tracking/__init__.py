@@ -6,11 +6,14 @@ global state, so two trackers never disturb each other, and it turns a failing s
 
 import os
 
-# Read while MLflow is imported, so it comes first: nothing here reports home.
-os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+from cluster.home import require_home
 
-from cluster.tracking.models import log_model
-from cluster.tracking.runs import UI_PORT, Run, Tracker
-from cluster.tracking.store import open_tracker
+# Both are read while MLflow is imported, so they come first: nothing here reports home, and there is one.
+os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+require_home()
+
+from cluster.tracking.models import log_model  # noqa: E402
+from cluster.tracking.runs import UI_PORT, Run, Tracker  # noqa: E402
+from cluster.tracking.store import open_tracker  # noqa: E402
 
 __all__ = ["UI_PORT", "Run", "Tracker", "log_model", "open_tracker"]

@@ -4,6 +4,7 @@ import getpass
 import json
 import math
 import os
+import shlex
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,8 +20,10 @@ from mlflow.exceptions import MlflowException
 from mlflow.protos.databricks_pb2 import RESOURCE_DOES_NOT_EXIST, ErrorCode
 from sqlalchemy.exc import SQLAlchemyError
 
+from cluster.config import SQLITE, TrackingSettings
 from cluster.errors import UserError
 from cluster.files import json_values
+from cluster.tracking.origin import origin
 from workers.dataset.storage.location import Location
 
 UI_PORT = 5000
@@ -28,8 +31,11 @@ UI_PORT = 5000
 METRICS_PER_REQUEST = 1000
 PARAMETERS_PER_REQUEST = 100
 PARAMETER_LENGTH = 6000
+TAG_LENGTH = 8000
 DIGEST_LENGTH = 36
-"""These four are MLflow's limits; a longer fingerprint is kept whole in the tag `svaedc.dataset`."""
+"""These five are MLflow's limits; a longer fingerprint is kept whole in the tag `svaedc.dataset`."""
+STORE_ERRORS = (MlflowException, SQLAlchemyError, OSError, UnicodeError)
+"""A store that fails raises one of these; the last where the system's encoding lacks a letter of its path."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,12 @@ class Run:
     def url(self) -> str:
         """Where a browser shows the run: on the server, or on `svaedc ui` of a SQLite store."""
         return f"{self.tracker.page}/{self.id}"
+
+    @property
+    def link(self) -> str:
+        """The same for a person to read, with the command without which nothing answers there."""
+        viewer = self.tracker.viewer
+        return f"{self.url} (`{viewer}` shows it)" if viewer else self.url
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
         """Records numbers at one step, in one request; undefined ones (NaN, infinite) are left out.
@@ -74,7 +86,8 @@ class Run:
     def tags(self, values: Mapping[str, str]) -> None:
         """Sets tags, replacing earlier values."""
         with self.tracker.reaching():
-            self.tracker.client.log_batch(self.id, tags=[RunTag(*pair) for pair in values.items()])
+            tags = [RunTag(key, _text(value)) for key, value in values.items()]
+            self.tracker.client.log_batch(self.id, tags=tags)
 
     def figure(self, path: Path) -> None:
         """Keeps a copy of a figure that was written to a file, under `figures/`."""
@@ -155,6 +168,15 @@ class Tracker:
         server = self.uri if self.uri.startswith("http") else f"http://127.0.0.1:{UI_PORT}"
         return f"{server.rstrip('/')}/#/experiments/{self.experiment}/runs"
 
+    @property
+    def viewer(self) -> str:
+        """The command that serves the pages of a SQLite store; "" for a server, which is there already."""
+        if not self.uri.startswith(SQLITE):
+            return ""
+        usual = Path(TrackingSettings().uri.removeprefix(SQLITE)).absolute()
+        is_usual = self.uri == f"{SQLITE}{usual}"
+        return "svaedc ui" if is_usual else f"svaedc ui --set {shlex.quote(f'tracking.uri={self.uri}')}"
+
     def run(
         self, name: str, kind: str, parameters: Mapping[str, Any], tags: Mapping[str, str] | None = None
     ) -> Run:
@@ -172,8 +194,9 @@ class Tracker:
         Raises:
             UserError: the store cannot be written.
         """
-        described = {"svaedc.kind": kind, "mlflow.user": _user(), **(tags or {})}
-        texts = [Param(key, str(value)[:PARAMETER_LENGTH]) for key, value in _flat(parameters)]
+        described = {"svaedc.kind": kind, "mlflow.user": _user(), **origin(kind), **(tags or {})}
+        described = {key: _text(value)[:TAG_LENGTH] for key, value in described.items()}
+        texts = [Param(key, _text(value)[:PARAMETER_LENGTH]) for key, value in _flat(parameters)]
         with self.reaching():
             run_id = self.client.create_run(self.experiment, tags=described, run_name=name).info.run_id
             for batch in _batches(texts, PARAMETERS_PER_REQUEST):
@@ -210,7 +233,7 @@ class Tracker:
         """Turns whatever a failing store raises into a `UserError` that names it."""
         try:
             yield
-        except (MlflowException, SQLAlchemyError, OSError) as error:
+        except STORE_ERRORS as error:
             raise unusable(self.uri, error) from error
 
 
@@ -225,10 +248,16 @@ def unusable(uri: str, error: Exception) -> UserError:
         The error, to be raised.
     """
     reason = str(error).strip().partition("\n")[0] or type(error).__name__
+    remedy = "set LC_ALL=C.UTF-8" if isinstance(error, UnicodeError) else "make it writable and reachable"
     return UserError(
-        f"the MLflow store {uri} cannot be used: {reason}; make it writable and reachable, "
+        f"the MLflow store {uri} cannot be used: {reason}; {remedy}, "
         "or name another with --set tracking.uri=sqlite:///FILE"
     )
+
+
+def _text(value: object) -> str:
+    """A value as MLflow keeps it: bytes of a file's name that the system's encoding lacks are UTF-8."""
+    return str(value).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def _user() -> str:

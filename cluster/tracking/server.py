@@ -38,7 +38,7 @@ def serve_ui(settings: TrackingSettings, port: int, announce: Callable[[str], No
     if tracker.uri.startswith("http"):
         raise UsageError(f"tracking.uri is a server already, open {tracker.page} in a browser")
     _require_free(port)
-    with terminating_as_exit(), _server(tracker.uri, port) as server:
+    with terminating_as_exit(), _server(tracker.client.tracking_uri, port) as server:
         _wait_until_up(server, port)
         announce(tracker.page.replace(f":{UI_PORT}/", f":{port}/"))
         server.wait()
@@ -76,10 +76,11 @@ def _server(uri: str, port: int) -> Iterator[subprocess.Popen[bytes]]:
     ]
     command += ["--host", HOST, "--port", str(port), "--workers", "1"]
     quiet = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
+    alone = {"PYTHONSAFEPATH": "1"}  # a user's `random.py` in the working directory is not Python's
     prctl = ctypes.CDLL(None).prctl
     server = subprocess.Popen(
         command,
-        env={**os.environ, **quiet},
+        env={**os.environ, **quiet, **alone},
         stdout=sys.stderr.fileno(),
         start_new_session=True,
         preexec_fn=lambda: prctl(PR_SET_PDEATHSIG, signal.SIGTERM),

@@ -63,7 +63,7 @@ def record(
         f"{job.model / MODEL}: held-out error against the per-step median {metrics['rec_norm']:.2f} "
         f"reconstructed, {metrics['gen_norm']:.2f} generated from x; correlation of y "
         f"{metrics['corr_y_rec']:.2f} and {metrics['corr_y_gen']:.2f}; {metrics['active_dimensions']:.0f} of "
-        f"{model.config.tau_size} latent dimensions active; {run.url}"
+        f"{model.config.tau_size} latent dimensions active; {run.link}"
     )
     return summary
 

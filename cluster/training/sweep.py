@@ -175,12 +175,13 @@ def _record(points: Sequence[SweepPoint], model: Path, run: Run) -> Path:
     results = sorted((point.result for point in points), key=lambda each: -each["svae-dc"]["best"])
     path = model / TABLE
     with replacing(path) as unfinished:
-        unfinished.write_text("\n".join(_table(results)) + "\n")
+        unfinished.write_text("\n".join(_table(results)) + "\n", encoding="utf-8")
     for result in results:
         with run.child(result["name"], {"point": result["name"]}) as child:
             child.metrics(_numbers(result), step=0)
     run.file(path)
-    say(f"{path.read_text()}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.url}")
+    table = path.read_text(encoding="utf-8")
+    say(f"{table}\nbest for BO by this proxy: {results[0]['name']}; {path}; {run.link}")
     return path
 
 

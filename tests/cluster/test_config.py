@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -52,18 +53,102 @@ def test_the_command_line_wins_over_the_file_and_its_last_word_counts(tmp_path):
     [
         ("train.worker=2", "unknown setting 'train.worker', did you mean 'train.workers'?"),
         ("trian.workers=2", "unknown setting 'trian', did you mean 'train'?"),
-        ("collect.actors=0", "collect.actors: .*greater than 0, got 0"),
-        ("train.stride=1.5", "train.stride: .*integer.*, got 1.5"),
-        ("tracking.uri=", "tracking.uri: .*, got None"),
+        ("collect.actors=0", "collect.actors: .*greater than 0, got '0'"),
+        ("train.stride=1.5", "train.stride: .*integer.*, got '1.5'"),
+        ("tracking.uri=", "tracking.uri: .*at least 1 character, got ''"),
+        ("tracking.uri=sqlite:///", "tracking.uri: .*sqlite:///FILE must name a file"),
+        ("tracking.uri=sqlite:///runs/", "tracking.uri: .*sqlite:///FILE must name a file"),
         ("train.workers", "--set takes section.key=value, such as .*, got 'train.workers'"),
         ("workers=2", "--set takes section.key=value"),
-        ("train.stride=[1", r"--set train.stride: '\[1' is not a YAML value"),
+        ("train.stride=[1", r"train.stride: .*integer.*, got '\[1'"),
     ],
 )
 def test_a_bad_override_names_the_key_and_the_expectation(override, message):
     with pytest.raises(UsageError, match=message) as raised:
         load_settings(RAY_CONFIG, [override])
     assert raised.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "runs #1",
+        "a: b",
+        "- a",
+        "[1",
+        "{a",
+        "'quoted'",
+        "&a",
+        "*a",
+        "!a",
+        "yes",
+        "null",
+        "1e3",
+        "007",
+        "a=b",
+        "?",
+        "%20",
+    ],
+)
+def test_a_text_means_itself_whatever_it_would_mean_in_yaml(text):
+    settings = load_settings(None, [f"tracking.experiment={text}", f"tracking.uri=sqlite:///{text}.db"])
+    assert settings.tracking.experiment == text
+    assert settings.tracking.file == Path(f"{text}.db")
+
+
+@pytest.mark.parametrize(
+    ("override", "value"),
+    [
+        ("collect.actors=all", "all"),
+        ("collect.actors=4", 4),
+        ("ray.object_store_memory=300_000_000", 300_000_000),
+        ("train.time_limit_seconds=.inf", inf),
+        ("train.time_limit_seconds=inf", inf),
+        ("train.time_limit_seconds=.5", 0.5),
+        ("train.time_limit_seconds= 1e3 ", 1000.0),
+        ("train.kl_weight=0", 0.0),
+        ("train.kl_weight=preset", "preset"),
+        ("train.updates=300", 300),
+        ("train.cache_folder=cache #1", Path("cache #1")),
+        ("train.cache_folder=~/cache", Path.home() / "cache"),
+        ("tracking.uri=http://tracker:5000", "http://tracker:5000"),
+    ],
+)
+def test_plain_text_becomes_what_the_setting_is(override, value):
+    section, _, key = override.partition("=")[0].partition(".")
+    given = getattr(getattr(load_settings(None, [override]), section), key)
+    assert given == value
+    assert type(given) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "line"),
+    [
+        ("metadata:\n  svaedc:\n    train: {stride: 5, workers: 1}\n    train: {}\n", "train", 4),
+        (
+            "metadata:\n  svaedc:\n    train:\n      stride: 5\n      workers: 1\n      stride: 6\n",
+            "stride",
+            6,
+        ),
+        ("cluster_name: a\nmetadata: {}\nmetadata: {}\n", "metadata", 3),
+        ('metadata:\n  svaedc:\n    train: {stride: 1}\n    "train": {}\n', "train", 4),
+        ("auth:\n  ssh_user: a\n  ssh_user: b\n", "ssh_user", 3),
+    ],
+)
+def test_a_key_that_stands_twice_is_named_with_its_line(tmp_path, text, key, line):
+    path = tmp_path / "given.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError, match=rf"given\.yaml, line {line}: {key!r} stands in line \d already"):
+        load_settings(path, [])
+
+
+def test_keys_may_be_shared_by_reference_and_stand_in_other_mappings(tmp_path):
+    path = tmp_path / "given.yaml"
+    shared = "all: &all {slots: 3}\n"
+    shared += "metadata: {svaedc: {compare: {<<: *all, pool_size: 9}, hardware: {pool_size: 8}}}"
+    path.write_text(shared, encoding="utf-8")
+    settings = load_settings(path, [])
+    assert (settings.compare.slots, settings.compare.pool_size, settings.hardware.pool_size) == (3, 9, 8)
 
 
 def test_an_unknown_key_in_a_file_names_the_file_and_the_nearest_key(tmp_path):

@@ -42,7 +42,7 @@ def finish(folder: Path, layout: Layout, facts: Mapping[str, int]) -> None:
         facts: what the file also says, `episodes` for their number among it.
     """
     checksums = {name: _checksum(_path(folder, name)) for name in layout}
-    (folder / READY).write_text(json.dumps({**facts, "crc32": checksums}) + "\n")
+    (folder / READY).write_text(json.dumps({**facts, "crc32": checksums}) + "\n", encoding="utf-8")
 
 
 def is_finished(folder: Path) -> bool:
@@ -67,7 +67,7 @@ def open_arrays(folder: Path, layout_of: Callable[[int], Layout]) -> dict[str, n
         ValueError: an array is damaged or missing; the message says what to delete.
     """
     try:
-        facts = json.loads((folder / READY).read_text())
+        facts = json.loads((folder / READY).read_text(encoding="utf-8"))
         layout, checksums = layout_of(facts["episodes"]), facts.get("crc32", {})
         return {name: _open_array(_path(folder, name), *layout[name], checksums.get(name)) for name in layout}
     except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError) as error:

@@ -67,7 +67,7 @@ def sweep_digests(dataset: Dataset) -> int:
 
 
 def _manifest_problems(dataset: Dataset) -> Iterator[Defect]:
-    if (dataset.folder / MANIFEST).read_text() != manifest_text(dataset.identity):
+    if (dataset.folder / MANIFEST).read_text(encoding="utf-8") != manifest_text(dataset.identity):
         yield Defect(MANIFEST, "it was changed: its text is not the one that `svaedc collect` writes")
     differences = manifest_differences(dataset)
     if differences:

@@ -33,7 +33,7 @@ def ensure_manifest(folder: Location, text: str) -> bytes:
     if isinstance(folder, ObjectPath):
         return _claim(folder, text)
     with temporary_file(folder, MANIFEST) as temporary:
-        temporary.write_text(text)
+        temporary.write_text(text, encoding="utf-8")
         synchronise(temporary)
         link(temporary, manifest)
     return manifest.read_bytes()
@@ -48,11 +48,11 @@ def _claim(folder: ObjectPath, text: str) -> bytes:
     """
     manifest = folder / MANIFEST
     claim = folder / WRITING / f"{MANIFEST}.{hashlib.sha256(text.encode()).hexdigest()[:12]}.{writer()}"
-    claim.write_text(text)
+    claim.write_text(text, encoding="utf-8")
     try:
         rival = _rival(folder, text)
         if not rival and not manifest.exists():
-            manifest.write_text(text)
+            manifest.write_text(text, encoding="utf-8")
         return rival or manifest.read_bytes()
     finally:
         claim.unlink(missing_ok=True)

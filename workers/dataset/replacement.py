@@ -75,7 +75,7 @@ def keep_aside(folder: Location, path: Location) -> Location:
 def _write_digest(folder: Location, shard: Shard, digest: str) -> None:
     target = digest_path(folder, shard)
     with temporary_file(folder, target.name) as temporary:
-        temporary.write_text(digest_line(shard, digest))
+        temporary.write_text(digest_line(shard, digest), encoding="utf-8")
         synchronise(temporary)
         move(temporary, target)
         synchronise(folder)

@@ -15,7 +15,7 @@ from jaxtyping import Float32, Float64, Int64, UInt8
 from workers.dataset.identity import Identity
 from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_in, require_own
 from workers.dataset.quantisation import decode, describe_encoding, encode
-from workers.dataset.storage.location import Location, source
+from workers.dataset.storage.location import Location, arrow_name, source
 from workers.dataset.storage.s3_connection import refusal
 from workers.rollout import Episode
 
@@ -144,7 +144,7 @@ def write(path: Path, identity: Identity, start: int, episodes: Sequence[Episode
         arrays["physics"] = pa.array([dict(episode.physics) for episode in episodes], type=kinds["physics"])
     pq.write_table(
         pa.table(arrays, schema=layout),
-        path,
+        arrow_name(path),
         row_group_size=ROW_GROUP,
         compression="zstd",
         compression_level=1,

@@ -149,7 +149,7 @@ def recorded_digest(folder: Location, shard: Shard) -> str:
         The first word of the file; "" when there is none.
     """
     try:
-        words = digest_path(folder, shard).read_text(errors="replace").split()
+        words = digest_path(folder, shard).read_text(encoding="utf-8", errors="replace").split()
     except FileNotFoundError:
         return ""
     return words[0] if words else ""
@@ -201,7 +201,7 @@ def _publish_digest(folder: Location, shard: Shard, digest: str) -> None:
     """Before the shard itself, so that no shard is without one; a shard already there keeps its own."""
     target = digest_path(folder, shard)
     with temporary_file(folder, target.name) as temporary:
-        temporary.write_text(digest_line(shard, digest))
+        temporary.write_text(digest_line(shard, digest), encoding="utf-8")
         synchronise(temporary)
         if not (folder / shard.name).exists():
             move(temporary, target)

@@ -83,7 +83,7 @@ def _byte_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[s
         yield "the disk does not read it"
     elif held != recorded:
         yield "its bytes differ from its .sha256 file"
-    elif digest_path.read_text(errors="replace") != shards.digest_line(shard, recorded):
+    elif digest_path.read_text(encoding="utf-8", errors="replace") != shards.digest_line(shard, recorded):
         yield "its .sha256 file is not as `sha256sum` writes it"
 
 

@@ -73,7 +73,7 @@ class Hexapod:
 
     def _load(self, urdf: str) -> int:
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
-        with NamedTemporaryFile("w", suffix=".urdf") as file:  # Bullet reads files only
+        with NamedTemporaryFile("w", encoding="utf-8", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()
             try:

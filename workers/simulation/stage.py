@@ -62,7 +62,7 @@ class Scene(Server):
         if isinstance(urdf, Path):
             path = Path(pybullet_data.getDataPath()) / urdf
             return pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self.client)
-        with NamedTemporaryFile("w", suffix=".urdf") as file:  # Bullet reads files only
+        with NamedTemporaryFile("w", encoding="utf-8", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()
             return pybullet.loadURDF(file.name, useFixedBase=True, physicsClientId=self.client)

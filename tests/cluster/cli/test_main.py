@@ -1,7 +1,11 @@
 """The command line as a user meets it: help that teaches, one-line errors, exit codes."""
 
+import os
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
+from platform import python_version
 
 import pytest
 
@@ -31,6 +35,48 @@ def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
     loaded = f"import cluster.cli.main, sys; print(sorted({heavy} & sys.modules.keys()))"
     listed = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert listed.stdout.strip() == "[]"
+
+
+def test_the_version_is_told_with_pythons(tmp_path):
+    assert (
+        svaedc("--version", folder=tmp_path).stdout
+        == f"svaedc {version('svaedc')}, Python {python_version()}\n"
+    )
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes_commands_and_options(shell):
+    ask = {"bash": {"COMP_WORDS": "svaedc col", "COMP_CWORD": "1"}}.get(
+        shell, {"_TYPER_COMPLETE_ARGS": "svaedc col"}
+    )
+    environment = {
+        **os.environ,
+        "_SVAEDC_COMPLETE": f"complete_{shell}",
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        **ask,
+    }
+    command = Path(sys.executable).parent / "svaedc"
+    said = subprocess.run([command], env=environment, capture_output=True, encoding="utf-8", check=False)
+    assert "collect" in said.stdout, said.stderr
+    assert "compare" not in said.stdout
+
+
+def test_help_spends_a_few_lines_on_options_of_all_commands(tmp_path):
+    said = svaedc("--help", folder=tmp_path).stdout
+    options = said.partition("Options")[2].partition("Commands")[0]
+    for option in ("--version", "--install-completion", "--show-completion", "--help"):
+        assert option in options
+    assert options.count("\n") < 9
+
+
+def test_a_mistake_is_one_line_where_no_terminal_is(tmp_path):
+    said = svaedc(
+        "collect", "--setup", "franka", "--dataset", "d" * 300, "--episodes", "many", folder=tmp_path
+    )
+    assert said.returncode == 2
+    assert said.stderr.count("\n") == 1
+    assert said.stderr.startswith("error: Invalid value for '--episodes': ")
+    assert "`svaedc collect --help` says what it takes" in said.stderr
 
 
 @pytest.mark.parametrize(

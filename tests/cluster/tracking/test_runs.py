@@ -1,13 +1,18 @@
 """Runs in a real MLflow store: everything given is there, and they end as their blocks end."""
 
+import shlex
+import sys
 from pathlib import Path
 
 import pytest
+from mlflow import MlflowClient
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
+from cluster.settings import load_settings
 from cluster.tracking import open_tracker
-from cluster.tracking.runs import unusable
+from cluster.tracking.origin import DESCRIPTIONS, command_line, origin
+from cluster.tracking.runs import Run, Tracker, unusable
 
 
 def record(tracker, run):
@@ -22,6 +27,59 @@ def test_a_run_keeps_its_name_kind_and_nested_parameters(tracker):
     assert kept.data.tags["svaedc.kind"] == "collect"
     assert kept.data.tags["note"] == "dry"
     assert kept.data.params == {"seed": "0", "train.stride": "5"}
+
+
+def test_a_run_says_which_command_made_it_and_what_that_does(tracker, monkeypatch):
+    monkeypatch.setattr(
+        sys, "argv", ["/usr/bin/svaedc", "collect", "--setup", "franka", "--dataset", "my data"]
+    )
+    with tracker.run("named", "collect", {}) as run, run.child("part", {}) as child:
+        pass
+    tags = record(tracker, run).data.tags
+    assert tags["mlflow.source.name"] == "svaedc collect --setup franka --dataset 'my data'"
+    assert tags["mlflow.source.type"] == "LOCAL"
+    first, command, where = tags["mlflow.note.content"].split("\n\n")
+    assert first == "Simulated episodes of random controllers, collected into a dataset."
+    assert command == f"    {tags['mlflow.source.name']}"
+    assert str(Path.cwd()) in where
+    assert "the run above this one" in record(tracker, child).data.tags["mlflow.note.content"]
+
+
+@pytest.mark.parametrize("kind", ["collect", "plan", "train", "sweep", "compare", "hardware", "child"])
+def test_every_kind_of_run_is_described(kind):
+    assert origin(kind)["mlflow.note.content"].startswith(DESCRIPTIONS[kind])
+
+
+def test_no_password_is_recorded(monkeypatch):
+    uri = "tracking.uri=https://me:secret@tracker:5000/x"
+    monkeypatch.setattr(sys, "argv", ["svaedc", "train", "--set", uri, "--model", "a:b@c"])
+    assert command_line() == "svaedc train --set tracking.uri=https://me:***@tracker:5000/x --model a:b@c"
+
+
+def test_file_names_that_are_no_text_here_are_recorded_as_utf_8(tracker):
+    """As `LC_ALL=C` makes them."""
+    with tracker.run("undecoded", "collect", {"folder": "Gr\udcc3\udcb6\udcc3\udc9fe"}) as run:
+        run.tags({"note": "\udcff"})
+    kept = record(tracker, run).data
+    assert kept.params == {"folder": "Größe"}
+    assert kept.tags["note"] == "\ufffd"
+
+
+def test_a_link_into_a_file_is_followed_by_the_command_that_shows_it(tmp_path, monkeypatch):
+    (tmp_path / "here it's").mkdir()
+    monkeypatch.chdir(tmp_path / "here it's")
+    run = Run(open_tracker(TrackingSettings()), "123")
+    assert run.link == f"{run.url} (`svaedc ui` shows it)"
+    monkeypatch.chdir(tmp_path)
+    _, command, _ = run.link.split("`")
+    *start, option, setting = shlex.split(command)
+    assert (start, option) == (["svaedc", "ui"], "--set")
+    assert load_settings(None, [setting]).tracking.file == tmp_path / "here it's" / "mlflow.db"
+
+
+def test_a_link_to_a_server_stands_alone():
+    tracker = Tracker(MlflowClient("https://tracker:5000"), "https://tracker:5000", experiment="7")
+    assert Run(tracker, "123").link == "https://tracker:5000/#/experiments/7/runs/123"
 
 
 def test_metrics_keep_their_steps_and_undefined_ones_are_left_out(tracker):

@@ -1,5 +1,6 @@
 """Stores of MLflow: made once, and named with the remedy where they cannot be used."""
 
+import os
 import subprocess
 import sys
 import time
@@ -10,6 +11,7 @@ import pytest
 
 from cluster.config import TrackingSettings
 from cluster.errors import UserError
+from cluster.settings import load_settings
 from cluster.tracking.store import open_tracker
 
 REPOSITORY = Path(__file__).parents[3]
@@ -39,6 +41,48 @@ def test_a_file_that_is_no_database_is_refused_and_left_alone(tmp_path):
 def test_a_server_that_does_not_answer_is_refused(free_port):
     with pytest.raises(UserError, match=rf"127\.0\.0\.1:{free_port} cannot be used: .*refused"):
         open_tracker(TrackingSettings(uri=f"http://127.0.0.1:{free_port}"))
+
+
+NAMES = ["what? #1 50%20x", "Größe, two words", 'Bob\'s "best" :10', "a;b&c=d@e[x]\\y"]
+
+
+@pytest.mark.parametrize(
+    ("name", "way"), [(NAMES[0], "in the setting"), *((name, "of the working directory") for name in NAMES)]
+)
+def test_a_store_lies_in_its_folder_whatever_the_name_and_is_read_back(tmp_path, monkeypatch, name, way):
+    folder = tmp_path / name
+    folder.mkdir()
+    (tmp_path / "notes.txt").write_text("notes", encoding="utf-8")
+    monkeypatch.chdir(folder if way.startswith("of") else tmp_path)
+    settings = load_settings(
+        None, [] if way.startswith("of") else [f"tracking.uri=sqlite:///{folder}/mlflow.db"]
+    )
+    with open_tracker(settings.tracking).run("kept", "collect", {"folder": folder}) as run:
+        run.file(tmp_path / "notes.txt")
+    assert sorted(path.name for path in folder.iterdir()) == ["mlflow.db", "mlruns"]
+    assert {path.name for path in tmp_path.iterdir()} == {name, "notes.txt"}
+    again = open_tracker(settings.tracking)
+    assert again.client.get_run(run.id).data.params == {"folder": str(folder)}
+    monkeypatch.chdir(tmp_path)
+    read = Path(again.client.download_artifacts(run.id, "notes.txt"))
+    kept = folder / "mlruns" / run.id / "artifacts" / "notes.txt"
+    assert read.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8") == "notes"
+
+
+def test_the_address_that_is_shown_names_the_same_store(tmp_path):
+    shown = open_tracker(load_settings(None, [f"tracking.uri=sqlite:///{tmp_path}/50% #1?.db"]).tracking)
+    assert shown.uri == f"sqlite:///{tmp_path}/50% #1?.db"
+    with shown.run("found again", "collect", {}) as run:
+        pass
+    assert open_tracker(load_settings(None, [f"tracking.uri={shown.uri}"]).tracking).holds(run.id)
+
+
+def test_a_folder_that_the_systems_encoding_cannot_name_is_refused_with_the_remedy(tmp_path, monkeypatch):
+    folder = tmp_path / os.fsdecode(b"Gr\xf6\xdfe")
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    with pytest.raises(UserError, match=r"cannot be used: .*; set LC_ALL=C\.UTF-8, or name another"):
+        open_tracker(TrackingSettings())
 
 
 def test_commands_that_create_a_store_at_once_share_one_experiment(tmp_path):

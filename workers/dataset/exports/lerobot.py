@@ -19,6 +19,7 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
+from workers.dataset.storage.location import arrow_name
 
 
 @dataclass
@@ -206,8 +207,8 @@ def _features(identity: Identity) -> dict[str, dict[str, Any]]:
 def _write(table: pa.Table, path: Path, row_group: int | None = None) -> None:
     """A row group per episode, so that a reader may fetch one."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    pq.write_table(table, path, row_group_size=row_group, compression="zstd")
+    pq.write_table(table, arrow_name(path), row_group_size=row_group, compression="zstd")
 
 
 def _write_json(content: Mapping[str, Any], path: Path) -> None:
-    path.write_text(json.dumps(content, indent=4) + "\n")
+    path.write_text(json.dumps(content, indent=4) + "\n", encoding="utf-8")

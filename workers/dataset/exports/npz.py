@@ -28,7 +28,7 @@ def export_npz(dataset: Dataset, out: Path) -> Iterator[Shard]:
         ValueError: a shard is damaged, or two overlap.
     """
     shards = dataset.disjoint()
-    (out / MANIFEST).write_text(manifest_text(dataset.identity))
+    (out / MANIFEST).write_text(manifest_text(dataset.identity), encoding="utf-8")
     names = _names(dataset.identity)
     for shard in shards:
         arrays = _arrays(dataset.read(shard), dataset.identity)

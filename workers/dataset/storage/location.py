@@ -1,5 +1,6 @@
 """Where a dataset lies: in a folder of this machine's file systems, or below a prefix of an object store."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -42,4 +43,9 @@ def fetch(path: Location) -> Location:
 
 def source(path: Location) -> Any:
     """What PyArrow reads a file from, so that it need not fetch all of an object."""
-    return path if isinstance(path, Path) else path.open()
+    return arrow_name(path) if isinstance(path, Path) else path.open()
+
+
+def arrow_name(path: Path) -> str:
+    """A file's name as PyArrow takes it: UTF-8 even where the system's encoding is another (`LC_ALL=C`)."""
+    return os.fsencode(path).decode("utf-8", "surrogateescape")

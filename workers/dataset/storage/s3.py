@@ -146,9 +146,17 @@ class ObjectPath:
         with reaching(self), self._store.open_input_stream(self._place) as stream:
             return bytes(stream.read())
 
-    def read_text(self, errors: str = "strict") -> str:
-        """Its bytes as UTF-8."""
-        return self.read_bytes().decode(errors=errors)
+    def read_text(self, encoding: str = "utf-8", errors: str = "strict") -> str:
+        """Its bytes as text.
+
+        Args:
+            encoding: as of `pathlib.Path`.
+            errors: as of `pathlib.Path`.
+
+        Returns:
+            All of them.
+        """
+        return self.read_bytes().decode(encoding, errors)
 
     def write_bytes(self, content: bytes) -> None:
         """Put the object there at once, in the place of what was there.
@@ -176,9 +184,14 @@ class ObjectPath:
             finally:
                 del stream  # one that failed ends here by joining its parts, before whoever called goes on
 
-    def write_text(self, text: str) -> None:
-        """The same for text, as UTF-8."""
-        self.write_bytes(text.encode())
+    def write_text(self, text: str, encoding: str = "utf-8") -> None:
+        """The same for text.
+
+        Args:
+            text: that the object is to hold.
+            encoding: as of `pathlib.Path`.
+        """
+        self.write_bytes(text.encode(encoding))
 
     def unlink(self, *, missing_ok: bool = False) -> None:
         """Remove the object."""

@@ -82,7 +82,9 @@ def _state(pid: int) -> tuple[str, str]:
     """A process's state, as a letter, and when it began; empty texts where nobody tells."""
     try:
         # The name, in brackets, may hold anything; the state follows it, and 19 further on the start.
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        fields = (
+            Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+        )
         return fields[0], fields[19]
     except (OSError, IndexError):
         return "", ""
@@ -96,7 +98,7 @@ def _place() -> str:
 
 def _boot() -> str:
     path = Path("/proc/sys/kernel/random/boot_id")
-    return path.read_text().strip() if path.exists() else "boot"
+    return path.read_text(encoding="utf-8").strip() if path.exists() else "boot"
 
 
 def _ids() -> str:
