@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from cluster import methods as known_methods
 from cluster.comparison import compare as comparison_driver
 from cluster.comparison.compare import Comparison
 from cluster.comparison.plan import Grid, plan_comparison
@@ -22,8 +21,9 @@ from cluster.datasets import collect as collection_driver
 from cluster.datasets.plan import plan_collection, say_complete
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable_dataset, require_working_setup, setup_of
-from cluster.models import TrainedModel, load_model
-from cluster.optimization import hidden_robot
+from cluster.optimization import methods as known_methods
+from cluster.optimization.factory import hidden_robot
+from cluster.optimization.models import TrainedModel, load_model
 from cluster.services import services
 from cluster.settings import load_settings
 from cluster.training import train as training_driver

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 
-from cluster import methods
 from cluster.inputs import search_working_directory
+from cluster.optimization import methods
 from svaedc.bo.method_names import SUMMARIES
 from workers.plug_ins import Kind, Part, find, offer, package_of
 from workers.setups import SETUPS, registry

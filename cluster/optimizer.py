@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32
 
-from cluster import methods
 from cluster.comparison.records import append, read_trials
 from cluster.config import CompareSettings
 from cluster.inputs import setup_of, usage_errors
-from cluster.models import trained_model
-from cluster.optimization import Optimization
+from cluster.optimization import methods
+from cluster.optimization.factory import Optimization
+from cluster.optimization.models import trained_model
 from svaedc.bo.loop import Outcome, Trial, history_of, record
 from svaedc.model.svae_dc import SvaeDc
 from workers.controllers.controller import unit_cube

@@ -20,7 +20,7 @@ _WHERE: Final = {
     "SvaeDc": "svaedc.model.svae_dc",
     "collect": "cluster.api",
     "compare": "cluster.api",
-    "load_model": "cluster.models",
+    "load_model": "cluster.optimization.models",
     "load_setup": "cluster.api",
     "method_names": "cluster.api",
     "open_dataset": "cluster.api",

@@ -6,7 +6,7 @@ from cluster.api import open_dataset as open_dataset
 from cluster.api import setup_names as setup_names
 from cluster.api import simulated_robot as simulated_robot
 from cluster.api import train as train
-from cluster.models import load_model as load_model
+from cluster.optimization.models import load_model as load_model
 from cluster.optimizer import Optimizer as Optimizer
 from svaedc.model.svae_dc import SvaeDc as SvaeDc
 from workers.dataset.folder import Dataset as Dataset

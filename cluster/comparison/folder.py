@@ -8,9 +8,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from cluster import files, methods
+from cluster import files
 from cluster.comparison.records import NAME, RUNS, RunKey, Runs, append, read_trials, write_table
 from cluster.errors import UserError
+from cluster.optimization import methods
 from svaedc.bo.loop import Trial
 from workers.plug_ins import file_name
 from workers.setups import registry as setups

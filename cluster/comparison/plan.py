@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cluster import methods
 from cluster.comparison.folder import DECLARED, ComparisonFolder
 from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.worker import ComparisonJob
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
 from cluster.inputs import usage_errors
-from cluster.models import trained_model
+from cluster.optimization import methods
+from cluster.optimization.models import trained_model
 from cluster.progress import say
 from svaedc.analysis.seeds import common_purpose
 from workers.dataset.shards import sha256

@@ -9,7 +9,7 @@ import numpy as np
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.failures import failure_text
-from cluster.optimization import outcome_of
+from cluster.optimization.factory import outcome_of
 from svaedc.bo.loop import Outcome
 from workers.attempts import Attempts
 from workers.isolation import IsolatedAttempts

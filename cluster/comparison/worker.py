@@ -10,13 +10,13 @@ import numpy as np
 import torch
 from ray import tune
 
-from cluster import methods
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
 from cluster.comparison.robot import HiddenRobot, safe_attempts
 from cluster.files import DISK_ERRORS
-from cluster.models import shared_model
-from cluster.optimization import Optimization, hidden_physics
+from cluster.optimization import methods
+from cluster.optimization.factory import Optimization, hidden_physics
+from cluster.optimization.models import shared_model
 from svaedc.bo.loop import Trial, trials
 from workers import setups
 from workers.attempts import TIMEOUT_SECONDS, Attempts

@@ -5,10 +5,10 @@ import json
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from cluster import methods
 from cluster.errors import UserError
 from cluster.hardware.events import canonical
 from cluster.hardware.states import Approval
+from cluster.optimization import methods
 from workers.plug_ins import file_name
 from workers.setups import registry
 
@@ -30,7 +30,7 @@ class CampaignIdentity:
         pool: number of random controllers the method chooses from, at least 1.
         trials: suggested trials after the random ones, at least 0.
         approval: who lets a controller onto the robot.
-        draws: version of how controllers are drawn, `cluster.optimization.DRAWS`; nobody asks for one, a
+        draws: version of how controllers are drawn, `DRAWS` of the factory; nobody asks for one, a
             campaign keeps the one that it began with.
         codes: SHA-256 of the files of a user's own setup and method by their names, as JSON; "" where both
             ship, and of campaigns that began before there was such a field.

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cluster import methods
 from cluster.errors import UsageError
 from cluster.hardware.events import canonical
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.proposals import fingerprint
 from cluster.hardware.states import Approval
 from cluster.inputs import search_working_directory
-from cluster.optimization import DRAWS
+from cluster.optimization import methods
+from cluster.optimization.factory import DRAWS
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
 from workers.setups import SETUPS, registry

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from cluster import methods
 from cluster.errors import UserError
 from cluster.hardware.identity import CampaignIdentity
 from cluster.inputs import usage_errors
-from cluster.models import trained_model
-from cluster.optimization import Optimization
+from cluster.optimization import methods
+from cluster.optimization.factory import Optimization
+from cluster.optimization.models import trained_model
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
 from svaedc.bo.strategies import Method

@@ -11,7 +11,7 @@ from jaxtyping import UInt8
 from cluster.errors import UsageError, UserError
 from cluster.files import replacing
 from cluster.inputs import setup_of
-from cluster.models import trained_model
+from cluster.optimization.models import trained_model
 from cluster.progress import ProgressLine, say
 from cluster.rendering.frames import Moment, add_title, caption, stills, summary
 from cluster.rendering.video import STILLS, Picture, mosaic, write

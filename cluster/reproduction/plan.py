@@ -9,7 +9,7 @@ from typing import Final
 
 from cluster.config import Settings, TrainSettings
 from cluster.errors import UserError
-from cluster.models import trained_model
+from cluster.optimization.models import trained_model
 from cluster.reproduction.recipe import NINE, Panel, Recipe
 from cluster.training.record import MEASURES
 from svaedc.training.presets import Sizes, preset, usual_stride

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from cluster.optimization import hidden_robot
+from cluster.optimization.factory import hidden_robot
 from workers import setups
 from workers.rollout import rollout
 

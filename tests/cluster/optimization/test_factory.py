@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cluster.optimization import Optimization
+from cluster.optimization.factory import Optimization
 from svaedc.bo.history import History
 from workers import setups
 from workers.randomness import Stream, generator

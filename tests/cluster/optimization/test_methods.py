@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from cluster import methods
+from cluster.optimization import methods
 from svaedc.bo.candidates import Problem
 from svaedc.bo.history import History
 from tests.packages import install

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from cluster import methods
+from cluster.optimization import methods
 from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents

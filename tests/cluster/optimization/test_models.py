@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from cluster.errors import UserError
-from cluster.models import shared_model, trained_model
+from cluster.optimization.models import shared_model, trained_model
 from svaedc.model import checkpoint
 from svaedc.model.config import ModelConfig
 from svaedc.model.svae_dc import SvaeDc
