@@ -61,9 +61,10 @@ def _say_version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
 
 @app.callback()
 def _of_all_commands(
-    _: Annotated[  # noqa: FBT002 - a switch of the command line
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print it, and Python's.")
-    ] = False,
+    _: Annotated[
+        bool | None,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="Print it, and Python's."),
+    ] = None,
 ) -> None:
     """What stands before a command; the help is that of `app`."""
 

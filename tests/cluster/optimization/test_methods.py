@@ -85,7 +85,7 @@ def test_only_a_users_method_has_a_code_and_says_itself_that_it_needs_a_model(pr
     assert methods.code("svae-dc-acqf-ei") == ""
     assert methods.needs_model("my_methods:Latent")
     with pytest.raises(
-        LookupError, match=r"my_methods:Latent failed with ValueError: latents .*my_methods\.py, line"
+        LookupError, match=r"my_methods:Latent failed with ValueError: latents .*my_methods\.py:"
     ):
         methods.build("my_methods:Latent", problem)
 
@@ -108,7 +108,7 @@ def test_a_suggestion_that_is_no_controller_is_refused_naming_the_method(problem
     ("name", "message"),
     [
         ("my_methods:mute", r"my_methods:mute must give an object with suggest\(history, rng\), got object"),
-        ("my_methods:misspelt", r"failed with AttributeError: .*'pol'.*my_methods\.py, line 39\)"),
+        ("my_methods:misspelt", r"failed with AttributeError: .*'pol'.*my_methods\.py:39"),
         ("my_methods:number", "my_methods:number must be a class or function .* got int"),
         ("my_methods:Gredy", "module 'my_methods' has no 'Gredy'; did you mean 'Greedy'"),
         ("gredy", "unknown method 'gredy'; did you mean 'greedy'.*known: bbk-kl"),
