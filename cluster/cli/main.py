@@ -50,7 +50,7 @@ _COMPLETION = {
 """Typer's own words for its options take several lines of the help."""
 
 
-def _say_version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
+def _say_version(wanted: bool | None) -> None:  # noqa: FBT001 - typer calls it so
     if wanted:
         from importlib.metadata import version
         from platform import python_version
