@@ -7,6 +7,7 @@ model or comparison may be begun by one and continued by the other.
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from svaedc.bo import methods as bo_methods
 from svaedc.bo.loop import Outcome
 from workers.dataset import folder as dataset_folder
 from workers.dataset.folder import Dataset
+from workers.rollout import rollout
 from workers.setups import SETUPS, Setup
 
 METHODS = ("random", "screened-random", "se", "svae", "svae-dc")
@@ -217,7 +219,7 @@ def simulated_robot(setup: Setup | str, gap: str = "paper", seed: int = 0) -> It
     """
     chosen = _setup(setup)
     with chosen.open() as environment:
-        evaluate = hidden_robot(chosen, environment, gap, seed)
+        evaluate = hidden_robot(chosen, partial(rollout, chosen, environment), gap, seed)
 
         def evaluate_array(x: np.ndarray) -> Outcome:
             return evaluate(np.asarray(x, dtype=np.float32))

@@ -64,6 +64,8 @@ class CollectSettings(Section):
     """A shard is put aside with its error after so many failures."""
     shard_timeout_seconds: PositiveFloat = 1800.0
     """A shard counts as failed after this time, and its actor is replaced."""
+    episode_timeout_seconds: PositiveFloat = 120.0
+    """An episode that takes longer hangs: it fails alone, and the others of its shard are kept."""
 
     def actor_count(self, cpus: int) -> int:
         """Rollout actors on a cluster with this many CPUs, at least one."""
@@ -145,6 +147,8 @@ class CompareSettings(Section):
     """So many candidate controllers are drawn afresh for every run."""
     initial_trials: PositiveInt = 2
     """So many random trials come before the first suggestion; all methods of a seed share them."""
+    episode_timeout_seconds: PositiveFloat = 120.0
+    """A trial that takes longer hangs: it counts as failed, and its run goes on."""
 
 
 class HardwareSettings(Section):

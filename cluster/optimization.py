@@ -1,5 +1,6 @@
 """What one run of Bayesian optimisation is made from; comparison, campaign and notebook all get it here."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -16,9 +17,9 @@ from svaedc.bo.loop import Outcome
 from svaedc.bo.online import Adjustable
 from svaedc.bo.strategies import Method
 from svaedc.model.svae_dc import SvaeDc
-from workers.environments.environment import Environment
+from workers.physics import Physics
 from workers.randomness import Stream, generator
-from workers.rollout import rollout
+from workers.rollout import FAILED, Episode
 from workers.setups import Setup
 
 DRAWS: Final = 2
@@ -91,24 +92,50 @@ class Optimization:
         return rng.random(shape, dtype=np.float32)
 
 
-def hidden_robot(
-    setup: Setup, environment: Environment, gap: str, seed: int
-) -> Callable[[np.ndarray], Outcome]:
-    """What one run maximises: the setup under hidden physics, drawn once from the ranges of a gap.
+RollOut = Callable[[np.ndarray, Physics], Episode]
+"""It gives the episode of a controller, [D] in the unit cube, under given physics."""
+
+
+def hidden_physics(setup: Setup, gap: str, seed: int) -> Physics:
+    """Draw the physics of one run, once, from the ranges of a gap.
+
+    Args:
+        setup: whose physics they are.
+        gap: level of the hidden physics, or its ranges written out.
+        seed: of the run, at least 0.
+
+    Returns:
+        The parameters, by name.
+    """
+    return setup.gap(gap).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
+
+
+def outcome_of(setup: Setup, episode: Episode) -> Outcome:
+    """Say what an episode shows to a method.
+
+    Args:
+        setup: whose episode it is.
+        episode: of a trial.
+
+    Returns:
+        Its outcome; a failed episode has neither an objective nor badness, and says what it failed of.
+    """
+    if episode.failure is not None:
+        return Outcome(math.nan, math.nan, success=False, stop=f"{FAILED}: {episode.failure.reason}")
+    return Outcome(f=episode.f, y=episode.y, success=episode.f > setup.success, stop=episode.stop)
+
+
+def hidden_robot(setup: Setup, roll_out: RollOut, gap: str, seed: int) -> Callable[[np.ndarray], Outcome]:
+    """What one run maximises: the setup under hidden physics.
 
     Args:
         setup: whose controllers are tried.
-        environment: in which; opened by the setup.
+        roll_out: gives the episode of a controller under given physics.
         gap: level of the hidden physics, or its ranges written out.
-        seed: of the draw, at least 0.
+        seed: of the run, at least 0.
 
     Returns:
         A function of a controller, [D] in the unit cube.
     """
-    physics = setup.gap(gap).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
-
-    def evaluate(x: np.ndarray) -> Outcome:
-        episode = rollout(setup, environment, x, physics)
-        return Outcome(f=episode.f, y=episode.y, success=episode.f > setup.success, stop=episode.stop)
-
-    return evaluate
+    physics = hidden_physics(setup, gap, seed)
+    return lambda x: outcome_of(setup, roll_out(x, physics))

@@ -1,11 +1,14 @@
 """The physics of an episode: named parameters, and the ranges they are drawn from."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+
+from workers import plain
+from workers.user_code import UserCodeError
 
 Physics = Mapping[str, float]
 
@@ -15,19 +18,18 @@ class PhysicsRanges:
     """A closed interval for every randomised parameter, by name.
 
     Raises:
-        ValueError: when an interval is reversed, negative or not finite.
+        UserCodeError: when an interval is reversed, or not of finite numbers.
     """
 
     intervals: Mapping[str, tuple[float, float]]
 
     def __post_init__(self) -> None:
         """Check every interval and freeze the mapping."""
-        for name, (low, high) in self.intervals.items():
-            if not (math.isfinite(low) and math.isfinite(high) and 0.0 <= low <= high):
-                raise ValueError(
-                    f"physics range of {name} must satisfy 0 <= low <= high, got [{low}, {high}]"
-                )
-        object.__setattr__(self, "intervals", MappingProxyType(dict(self.intervals)))
+        checked = {
+            plain.text(name, "a physics parameter's name"): _range(name, pair)
+            for name, pair in self.intervals.items()
+        }
+        object.__setattr__(self, "intervals", MappingProxyType(checked))
 
     def __str__(self) -> str:
         """As `ranges` reads it, in the order of the names: equal texts for equal ranges."""
@@ -42,17 +44,30 @@ class PhysicsRanges:
         return {name: float(rng.uniform(low, high)) for name, (low, high) in sorted(self.intervals.items())}
 
 
+def _range(name: str, pair: Any) -> tuple[float, float]:
+    try:
+        low, high = (plain.finite(value, name) for value in pair)
+    except (TypeError, ValueError) as error:
+        raise UserCodeError(
+            f"physics range of {name} must be two finite numbers (low, high), got {pair!r}"
+        ) from error
+    if not low <= high:
+        raise UserCodeError(f"physics range of {name} must satisfy low <= high, got [{low}, {high}]")
+    return low, high
+
+
 def around(nominal: Mapping[str, float], spread: float) -> PhysicsRanges:
     """Let every parameter vary about its nominal value.
 
     Args:
-        nominal: value of every parameter, by name, at least 0.
+        nominal: value of every parameter, by name, of either sign.
         spread: to either side, in parts of the value, in [0, 1] (0.05 is five per cent).
 
     Returns:
-        An interval for every parameter.
+        An interval for every parameter; one whose value is 0 does not vary.
     """
-    return PhysicsRanges({name: (v * (1 - spread), v * (1 + spread)) for name, v in nominal.items()})
+    ends = {name: (v * (1 - spread), v * (1 + spread)) for name, v in nominal.items()}
+    return PhysicsRanges({name: (min(pair), max(pair)) for name, pair in ends.items()})
 
 
 def ranges(text: str) -> PhysicsRanges:

@@ -9,28 +9,47 @@ Example:
     ((25, 500), True)
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, UInt8
 
 from workers.controllers.controller import Command, unit_cube
-from workers.environments.environment import Channel, Environment, Observed
+from workers.environments.environment import Channel, Environment, Observed, check_observed
 from workers.physics import Physics
 from workers.randomness import Stream, generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
-from workers.tasks.task import Bad, check_bad, require_objective
+from workers.tasks.task import Bad, check_bad
 
 VERSION = 1
 """It is part of a dataset's identity: raise it whenever an episode's bytes change."""
 
 DIVERGED = "diverged"
+"""It is the stop reason of an episode in which something was not finite or left its bounds."""
+FAILED = "failed"
+"""It is the stop reason of an episode whose code raised, hung or ended its process: `workers.attempts`."""
+UNUSABLE = frozenset({DIVERGED, FAILED})
+"""No model learns from episodes with these stop reasons."""
 
 Stored = UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
 """It holds per step one bit for each bad condition, or the degree in [0, 1] of a graded G_bad."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What an episode failed of.
+
+    Attributes:
+        reason: in one line; type, message, file and line where they are known.
+        text: all that is known, a traceback as a rule.
+    """
+
+    reason: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -43,13 +62,16 @@ class Episode:
         bad: per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad.
         y: badness, the fraction of bad steps or the mean degree, in [0, 1].
         f: the objective.
-        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded, or
-            the reason of the setup's stop rule. From there on ξ repeats the last state.
+        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded,
+            "failed" when code raised, or the reason of the setup's stop rule. From there on ξ repeats the
+            last state.
         physics: the parameters it ran under.
+        failure: what a failed episode failed of, for people; it is not stored with the episode.
 
-    A diverged episode is bad throughout, and no model may learn from it. A stopped one is a fact about its
-    controller, and may be learnt from: the step that gave the reason and all that were not run are bad as
-    `stopped`; those before have the conditions that were seen, and f is the task's `stopped_objective`.
+    A diverged or failed episode is bad throughout, and no model may learn from it. A stopped one is a fact
+    about its controller, and may be learnt from: the step that gave the reason and all that were not run are
+    bad as `stopped`; those before have the conditions that were seen, and f is the task's
+    `stopped_objective`.
     """
 
     x: Float32[np.ndarray, " d"]
@@ -59,6 +81,7 @@ class Episode:
     f: float
     stop: str
     physics: Mapping[str, float]
+    failure: Failure | None = None
 
 
 def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Physics) -> Episode:
@@ -90,7 +113,24 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
         records, reason = [step(command(t)) for t in range(setup.horizon)], ""
     else:
         records, reason = _run_until_stop(setup, environment, command)
-    return _episode(setup, environment.observed(records), reason, controller, physics)
+    observed = check_observed(environment.observed(records), setup.observation, len(records), setup.name)
+    return _episode(setup, observed, reason, controller, physics)
+
+
+def draw(setup: Setup, seed: int, index: int, repeats: int = 1) -> tuple[Float32[np.ndarray, " d"], Physics]:
+    """Draw what is rolled out as episode `index` of a dataset; it depends on nothing else.
+
+    Args:
+        setup: robot, controller and task.
+        seed: of the dataset.
+        index: of the episode.
+        repeats: how many consecutive episodes share a controller; each has physics of its own.
+
+    Returns:
+        The controller, [D], in [0, 1], and the physics.
+    """
+    x = generator(seed, Stream.CONTROLLER, index // repeats).random(setup.dimensions, dtype=np.float32)
+    return x, setup.physics.draw(generator(seed, Stream.PHYSICS, index))
 
 
 def random_episode(
@@ -106,16 +146,45 @@ def random_episode(
         repeats: how many consecutive episodes share a controller; each has physics of its own.
 
     Returns:
-        The episode, whose f is finite.
+        The episode. One whose objective is not finite has diverged: no dataset can hold that; a trial of
+        Bayesian optimisation without one counts as failed.
 
     Raises:
-        ValueError: as `rollout` does, or the objective is not finite, which no dataset can hold; a trial of
-            Bayesian optimisation without one counts as failed.
+        ValueError: as `rollout` does.
     """
-    x = generator(seed, Stream.CONTROLLER, index // repeats).random(setup.dimensions, dtype=np.float32)
-    episode = rollout(setup, environment, x, setup.physics.draw(generator(seed, Stream.PHYSICS, index)))
-    require_objective(setup.task, episode.f)
-    return episode
+    return storable(setup, rollout(setup, environment, *draw(setup, seed, index, repeats)))
+
+
+def storable(setup: Setup, episode: Episode) -> Episode:
+    """Make an episode one that a dataset can hold.
+
+    Args:
+        setup: robot, controller and task.
+        episode: of the setup.
+
+    Returns:
+        The episode itself; the record of one that diverged where its objective is not finite.
+    """
+    if math.isfinite(episode.f):
+        return episode
+    return _worthless_episode(setup, episode.xi, episode.x, episode.physics, DIVERGED)
+
+
+def failed_episode(setup: Setup, x: np.ndarray, physics: Physics, failure: Failure) -> Episode:
+    """Make the record of an episode that came to no end; it shows the middle of every channel.
+
+    Args:
+        setup: robot, controller and task.
+        x: the controller, [D], in [0, 1].
+        physics: that it ran under.
+        failure: what it failed of.
+
+    Returns:
+        The episode, bad throughout, with the lower limit of f.
+    """
+    nothing = np.empty((len(setup.observation), 0), np.float32)
+    episode = _worthless_episode(setup, nothing, unit_cube(x, setup.dimensions), physics, FAILED)
+    return replace(episode, failure=failure)
 
 
 def _run_until_stop(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
@@ -132,7 +201,7 @@ def _run_until_stop(setup: Setup, environment: Environment, command: Command) ->
 def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:
     sane, steps = sane_steps(observed.xi, setup.observation), observed.xi.shape[1]
     if sane < steps:
-        return _diverged_episode(setup, observed.xi[:, :sane], x, physics)
+        return _worthless_episode(setup, observed.xi[:, :sane], x, physics, DIVERGED)
     is_bad = setup.task.is_bad(observed)
     objective = setup.task.stopped_objective if reason else setup.task.objective
     stored = _encode_bad(check_bad(setup.task, is_bad, steps))
@@ -165,8 +234,8 @@ def _hold_last(xi: Float32[np.ndarray, "obs run"], horizon: int) -> Float32[np.n
     return np.pad(xi, ((0, 0), (0, missing)), mode="edge") if missing else xi
 
 
-def _diverged_episode(
-    setup: Setup, sane: Float32[np.ndarray, "obs sane"], x: np.ndarray, physics: Physics
+def _worthless_episode(
+    setup: Setup, sane: Float32[np.ndarray, "obs sane"], x: np.ndarray, physics: Physics, stop: str
 ) -> Episode:
     """The last sane state repeated, every step bad, f at its lower limit; never used to train a model."""
     if not sane.size:
@@ -174,7 +243,7 @@ def _diverged_episode(
     bad = _encode_bad(
         np.ones((len(setup.conditions), setup.horizon), np.float32 if setup.task.graded else bool)
     )
-    return Episode(x, _hold_last(sane, setup.horizon), bad, 1.0, diverged_objective(setup), DIVERGED, physics)
+    return Episode(x, _hold_last(sane, setup.horizon), bad, 1.0, diverged_objective(setup), stop, physics)
 
 
 def diverged_objective(setup: Setup) -> float:
@@ -195,7 +264,7 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     slack = 1e-5  # float32 rotation matrices
     low = np.array([channel.low for channel in channels], dtype=np.float32)[:, None] - slack
     high = np.array([channel.high for channel in channels], dtype=np.float32)[:, None] + slack
-    insane = np.flatnonzero(~((xi >= low) & (xi <= high)).all(axis=0))
+    insane = np.flatnonzero(~(np.isfinite(xi) & (xi >= low) & (xi <= high)).all(axis=0))
     return int(insane[0]) if insane.size else xi.shape[1]
 
 

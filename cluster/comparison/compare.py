@@ -10,6 +10,7 @@ from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.report import lines, publish, summary_of
 from cluster.comparison.tracking import Note, TrackedComparison, begin, note_in
 from cluster.comparison.tune import BestSoFar, Watch, submit
+from cluster.errors import UserError
 from cluster.progress import ProgressLine, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
@@ -41,8 +42,8 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
         Summary of all runs in the folder, and the address of the MLflow run.
 
     Raises:
-        UserError: the folder holds another comparison or cannot be written, runs kept failing, or MLflow
-            lacks some of the results.
+        UserError: the folder holds another comparison or cannot be written, MLflow lacks some of the results,
+            or runs kept failing; the report of all others is written first.
     """
     folder = plan.job.folder
     session.preflight(plan.slots)
@@ -55,8 +56,11 @@ def compare(plan: ComparisonPlan, session: Session, tracker: Tracker) -> Compari
             return Comparison(summary_of(plan.job, plan.setup, runs), Run(tracker, note.run).url)
         tracked = begin(folder, tracker, f"compare {plan.setup.name}", parameters)
         with tracked.run:
-            _submit(plan, tracked, runs)
-            return Comparison(_record(plan, tracked, parameters), tracked.run.url)
+            failure = _submit(plan, tracked, runs)
+            summary = _record(plan, tracked, parameters)
+            if failure is not None:
+                raise failure
+            return Comparison(summary, tracked.run.url)
 
 
 def _is_finished(plan: ComparisonPlan, note: Note, runs: Runs) -> bool:
@@ -65,11 +69,11 @@ def _is_finished(plan: ComparisonPlan, note: Note, runs: Runs) -> bool:
     return whole and plan.job.folder.holds((TABLE, SUMMARY, FIGURE, PAGE))
 
 
-def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Runs) -> None:
-    """Run what is missing, show it, and record every run that is whole."""
+def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Runs) -> UserError | None:
+    """Run what is missing, and record every run that is whole; the error of runs that kept failing."""
     missing = plan.missing(runs)
     if not missing:
-        return
+        return None
 
     def record_end(key: RunKey) -> None:
         trials = plan.job.folder.trials(key)
@@ -80,7 +84,7 @@ def _submit(plan: ComparisonPlan, tracked: TrackedComparison, runs: Runs) -> Non
     best = BestSoFar(plan.grid.methods, {key: runs[key][-1].best for key in keys if runs.get(key)})
     done = sum(min(len(runs.get(key, ())), length) for key in keys)
     with ProgressLine("trials", len(keys) * length, done) as progress:
-        submit(plan.job, missing, plan.slots, Watch(progress, best, record_end))
+        return submit(plan.job, missing, plan.slots, Watch(progress, best, record_end))
 
 
 def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mapping[str, Any]) -> Summary:
@@ -92,6 +96,8 @@ def _record(plan: ComparisonPlan, tracked: TrackedComparison, parameters: Mappin
     report = publish(plan.job, plan.setup, runs, summary, settings, plan.caption)
     for line in lines(summary):
         say(line)
+    for path in folder.failures()[:1]:
+        say(f"trials failed; what the first of them failed of is in {path}")
     say(f"{folder.path / PAGE}; {tracked.run.url}")
     asked = set(plan.grid.keys())
     for key, trials in runs.items():

@@ -17,6 +17,8 @@ TABLE = "trials.parquet"
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
 PAGE = "report.html"
+FAILED_TRIALS = "failed"
+"""What each failed trial failed of lies in this folder."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,55 @@ class ComparisonFolder:
             OSError: the disk takes no more.
         """
         append(key.path(self.path), trial)
+
+    def begin(self, key: RunKey, trial: int) -> None:
+        """Note that a trial of a run is under way; a process that dies leaves the note.
+
+        Args:
+            key: of the run.
+            trial: its index.
+
+        Raises:
+            OSError: the disk takes no more.
+        """
+        self._under_way(key).write_text(f"{trial}\n", encoding="utf-8")
+
+    def under_way(self, key: RunKey) -> int | None:
+        """The trial of a run that was begun last, whether or not it ended; None before the first."""
+        try:
+            return int(self._under_way(key).read_text(encoding="utf-8"))
+        except (FileNotFoundError, ValueError):  # none yet, or cut off by a full disk
+            return None
+
+    def end(self, key: RunKey) -> None:
+        """Forget which trial of a run was under way: it is whole."""
+        self._under_way(key).unlink(missing_ok=True)
+
+    def _under_way(self, key: RunKey) -> Path:
+        return key.path(self.path).with_suffix(".under-way")
+
+    def keep_failure(self, key: RunKey, trial: int, text: str) -> Path:
+        """Keep what a failed trial failed of.
+
+        Args:
+            key: of the run.
+            trial: its index.
+            text: for people.
+
+        Returns:
+            Where it lies.
+
+        Raises:
+            OSError: the disk takes no more.
+        """
+        path = self.path / FAILED_TRIALS / f"{key.method}-{key.run:05d}-{trial:03d}.txt"
+        path.parent.mkdir(exist_ok=True)
+        files.write_text(path, text)
+        return path
+
+    def failures(self) -> list[Path]:
+        """The accounts of failed trials, in the order of their names."""
+        return sorted((self.path / FAILED_TRIALS).glob("*.txt"))
 
     def begun_keys(self) -> list[RunKey]:
         """Every run that has begun, in order; of files that are no run's, such as copies, nothing is said."""

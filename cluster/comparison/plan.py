@@ -221,6 +221,7 @@ def plan_comparison(
         pool_size=settings.pool_size,
         initial=settings.initial_trials,
         trials=trials,
+        episode_timeout=settings.episode_timeout_seconds,
     )
     try:
         job.require(grid.methods, setup)

@@ -120,7 +120,7 @@ class _FullDisk(Stopper):
         return self._full
 
 
-def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Watch) -> None:
+def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Watch) -> UserError | None:
     """Bring runs to their end, `slots` of them at the same time.
 
     Args:
@@ -129,8 +129,11 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
         slots: runs at the same time, one CPU each.
         watch: is told of trials, and of runs that are over.
 
+    Returns:
+        What to tell of runs that kept failing; None where all are whole.
+
     Raises:
-        UserError: runs kept failing, or the disk is full; what they finished is kept.
+        UserError: the disk is full; what was finished is kept.
     """
     silence_tune()
     grid = tune.grid_search([{"method": key.method, "run": key.run} for key in missing])
@@ -150,8 +153,7 @@ def submit(job: ComparisonJob, missing: Sequence[RunKey], slots: int, watch: Wat
         ).fit()
     if watch.disk:
         raise disk_error(job.folder.path, watch.disk)
-    if results.errors:
-        raise _failures(job.folder, results, len(missing))
+    return _failures(job.folder, results, len(missing)) if results.errors else None
 
 
 def _failures(folder: ComparisonFolder, results: ResultGrid, asked: int) -> UserError:

@@ -12,13 +12,14 @@ from ray import tune
 
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
+from cluster.comparison.robot import HiddenRobot
 from cluster.files import DISK_ERRORS
 from cluster.models import shared_model
-from cluster.optimization import Optimization, hidden_robot
+from cluster.optimization import Optimization, hidden_physics
 from svaedc.bo import methods
 from svaedc.bo.loop import Trial, trials
 from workers import setups
-from workers.environments.environment import Environment
+from workers.attempts import TIMEOUT_SECONDS, Attempts
 from workers.hardware import robots
 from workers.setups import Setup
 
@@ -38,6 +39,7 @@ class ComparisonJob:
         pool_size: candidates of each run.
         initial: random trials that all methods of a seed share.
         trials: suggested trials after them.
+        episode_timeout: longest duration of a trial, in s.
     """
 
     folder: ComparisonFolder
@@ -47,6 +49,7 @@ class ComparisonJob:
     pool_size: int
     initial: int
     trials: int
+    episode_timeout: float = TIMEOUT_SECONDS
 
     @property
     def length(self) -> int:
@@ -70,29 +73,34 @@ class ComparisonJob:
         for name in names:
             methods.require(name, problem, self.trials)
 
-    def run(self, key: RunKey, setup: Setup, environment: Environment) -> Iterator[Trial]:
+    def run(self, key: RunKey, setup: Setup, attempts: Attempts) -> Iterator[Trial]:
         """Try what a run still has to try.
 
         Args:
             key: of the run.
             setup: whose controllers are tried.
-            environment: in which; every run of a process may use the same.
+            attempts: rolls them out; every run of a process may use the same.
 
         Yields:
             The missing trials, in order; each is on disk before it is yielded.
         """
-        planned = self.optimization(key, setup)
+        planned, earlier = self.optimization(key, setup), self.folder.trials(key)
+        physics = hidden_physics(setup, self.gap, key.run)
+        robot = HiddenRobot(
+            self.folder, key, setup, physics, attempts, self.episode_timeout, next=len(earlier)
+        )
         for trial in trials(
             planned.build(),
-            hidden_robot(setup, environment, self.gap, key.run),
+            robot.evaluate,
             np.stack([planned.initial(index) for index in range(self.initial)]),
             self.trials,
             planned.rng,
             time.monotonic,
-            self.folder.trials(key),
+            earlier,
         ):
             self.folder.append(key, trial)
             yield trial
+        self.folder.end(key)
 
     def optimization(self, key: RunKey, setup: Setup) -> Optimization:
         """What decides the controllers of a run.
@@ -121,13 +129,13 @@ class RunTrainable(tune.Trainable):
         """Start the simulation, which all runs of this actor share, and the first run."""
         torch.set_num_threads(1)
         self._setup = setups.load(config["job"].setup)
-        self._environment = self._setup.open()
+        self._attempts = Attempts(self._setup, config["job"].episode_timeout)
         self.reset_config(config)
 
     def reset_config(self, new_config: dict[str, Any]) -> bool:
         """Begin another run."""
         self._key = RunKey(**new_config["run"])
-        self._trials = new_config["job"].run(self._key, self._setup, self._environment)
+        self._trials = new_config["job"].run(self._key, self._setup, self._attempts)
         self._length = new_config["job"].length
         return True
 
@@ -158,4 +166,4 @@ class RunTrainable(tune.Trainable):
 
     def cleanup(self) -> None:
         """End the simulation."""
-        self._environment.close()
+        self._attempts.close()

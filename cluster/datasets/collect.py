@@ -13,6 +13,7 @@ from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 from workers.collection.forecast import forecast
 from workers.dataset.folder import Dataset
+from workers.dataset.notes import notes
 
 PILOT_SHARDS = 4
 """A plan rolls out that many shards, or two on every actor if that is more."""
@@ -105,8 +106,10 @@ def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:
         f"{counts.episodes} new in {duration(counts.seconds)} "
         f"({counts.rate:.1f}/s, {counts.core_seconds / 3600:.2f} core-hours), "
         f"mean badness {counts.badness:.2f}, {counts.diverged} diverged, "
-        f"{counts.stopped} stopped, {counts.retries} retries; {run.url}"
+        f"{counts.stopped} stopped, {counts.failed_text}{counts.retries} retries; {run.url}"
     )
+    for note in notes(dataset):
+        say(f"note: {note}")
     run.metrics(counts.metrics() | review(dataset), step=counts.episodes)
     run.dataset(dataset.identity.setup, dataset.fingerprint(), dataset.folder)
     left = quarantined_shards(dataset, plan.episodes)

@@ -10,7 +10,7 @@ import ray
 from cluster.config import CollectSettings
 from cluster.datasets.plan import CollectionPlan, episodes_in
 from cluster.datasets.progress import CollectionProgress, ProgressRecorder
-from cluster.datasets.quarantine import put_aside
+from cluster.datasets.quarantine import ACCOUNTS, keep_account, put_aside
 from cluster.datasets.worker import RolloutActor
 from cluster.errors import UserError
 from cluster.files import DISK_ERRORS
@@ -59,8 +59,10 @@ def rollout_pool(
     remote: Any = ray.remote(actor)
     options = remote.options(num_cpus=1, max_restarts=0, max_task_retries=0)
     return Pool(
-        spawn=lambda: options.remote(dataset.identity.setup, str(dataset.folder.resolve())),
-        submit=lambda worker, shard: worker.collect.remote(shard),
+        spawn=lambda: options.remote(
+            dataset.identity.setup, str(dataset.folder.resolve()), settings.episode_timeout_seconds
+        ),
+        submit=_submit,
         size=actors,
         limits=Limits(
             in_flight=settings.shards_in_flight_per_actor,
@@ -69,6 +71,11 @@ def rollout_pool(
         ),
         most=most,
     )
+
+
+def _submit(worker: Any, shard: Shard, deaths: int) -> Any:
+    """A shard that ended a process is rolled out where its episodes can end one each."""
+    return worker.collect_isolated.remote(shard) if deaths else worker.collect.remote(shard)
 
 
 def roll_out(
@@ -120,11 +127,36 @@ def _gather(
             if isinstance(outcome, Failed):
                 note_failure(outcome, plan.dataset, counts)
                 continue
-            counts.add(outcome.result)
+            note_report(outcome.result, plan.dataset, counts)
             reports.append(outcome.result)
             progress.advance(outcome.item.episodes, counts.note())
             recorder.record(counts)
     return list(reports)
+
+
+def note_report(report: ShardReport, dataset: Dataset, counts: CollectionProgress) -> None:
+    """Count a finished shard, and say at once what its user wants to know before the others are rolled out.
+
+    Args:
+        report: of the shard.
+        dataset: to which it belongs.
+        counts: of the collection, which are added to.
+
+    Raises:
+        UserError: the disk takes no more.
+    """
+    told = counts.failed
+    counts.add(report)
+    if report.leak:
+        say(f"warning: {report.leak}")
+    for failed in report.failures[: max(0, ACCOUNTS - told)]:
+        try:
+            path = keep_account(dataset, failed)
+        except OSError as error:
+            raise _unwritable(dataset, error) from error
+        if not told:
+            say(f"episode {failed.index} failed alone, all about it is in {path}: {failed.reason}")
+        told += 1
 
 
 def note_failure(failure: Failed[Shard], dataset: Dataset, counts: CollectionProgress) -> None:

@@ -4,6 +4,7 @@ from cluster.datasets.quarantine import quarantined_shards
 from cluster.errors import UserError
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
+from workers.dataset.notes import notes
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 
@@ -34,6 +35,7 @@ def dataset_info(dataset: Dataset) -> dict[str, str]:
     try:
         rows |= _table_rows(statistics(dataset)) if episodes else {}
         rows |= _irreducible(dataset) if identity.repeats > 1 else {}
+        rows |= {f"note {number}": note for number, note in enumerate(notes(dataset), start=1)}
     except ValueError as error:
         raise UserError(
             f"{error}; `svaedc dataset verify {dataset.folder}` lists everything that is wrong"
@@ -48,6 +50,7 @@ def _table_rows(found: Statistics) -> dict[str, str]:
         "badness": f"{found.badness:.3f} on average",
         "bad steps": ", ".join(f"{name} {share:.3f}" for name, share in found.bad_steps.items()),
         "diverged": str(found.diverged),
+        "failed": str(found.failed),
         "stopped": ", ".join(f"{count} {reason}" for reason, count in found.stopped.items()) or "0",
     }
 

@@ -74,6 +74,7 @@ class CollectionProgress:
     size: int = 0
     diverged: int = 0
     stopped: int = 0
+    failed: int = 0
     bad: float = 0.0  # summed over episodes
     best: float = float("-inf")
     rollout_seconds: float = 0.0
@@ -90,6 +91,7 @@ class CollectionProgress:
         self.size += report.size
         self.diverged += report.diverged
         self.stopped += report.stopped
+        self.failed += report.failed
         self.bad += report.badness * report.shard.episodes
         self.best = max(self.best, report.best)
         self.rollout_seconds += report.rollout_seconds
@@ -118,7 +120,13 @@ class CollectionProgress:
 
     def note(self) -> str:
         """What a person wants to know beside counts and rate."""
-        return f"bad {self.badness:.2f}{self.rates.note()}"
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"bad {self.badness:.2f}{failed}{self.rates.note()}"
+
+    @property
+    def failed_text(self) -> str:
+        """How many episodes failed, for a line of counts; "" for none, as is usual."""
+        return f"{self.failed} failed, " if self.failed else ""
 
     def metrics(self) -> dict[str, float]:
         """The counts as numbers for MLflow, by name."""
@@ -131,6 +139,7 @@ class CollectionProgress:
             "best_objective": self.best,
             "diverged": self.diverged,
             "stopped": self.stopped,
+            "failed": self.failed,
             "bytes_per_episode": self.size / max(self.episodes, 1),
             "core_hours": self.core_seconds / 3600,
             "storage_share": self.storage_seconds / max(self.core_seconds, 1e-9),

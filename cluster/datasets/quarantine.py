@@ -1,14 +1,20 @@
-"""Shards that kept failing, put aside with their errors."""
+"""Shards that kept failing, put aside with their errors, and accounts of episodes that failed alone."""
 
 import json
 import sys
 from collections.abc import Iterator, Sequence
 
+from cluster.failures import failure_text
+from workers.collection.shard import FailedEpisode
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard, shard_named
 from workers.dataset.storage.location import Location, files
+from workers.rollout import Failure
 
 FOLDER = "quarantine"
+
+ACCOUNTS = 100
+"""So many failed episodes of one command have an account; the dataset itself says which failed."""
 
 
 def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location:
@@ -27,6 +33,25 @@ def put_aside(dataset: Dataset, shard: Shard, errors: Sequence[str]) -> Location
     path.write_text(
         json.dumps({"start": shard.start, "stop": shard.stop, "errors": list(errors)}, indent=2) + "\n"
     )
+    return path
+
+
+def keep_account(dataset: Dataset, failed: FailedEpisode) -> Location:
+    """Keep what an episode failed of; the dataset holds it as `failed`, and no model learns from it.
+
+    Args:
+        dataset: to which it belongs.
+        failed: the episode.
+
+    Returns:
+        Where it is kept, as text.
+    """
+    path = dataset.folder / FOLDER / f"episode-{failed.index:09d}.txt"
+    path.parent.mkdir(exist_ok=True)
+    identity = dataset.identity
+    what = f"episode {failed.index} of seed {identity.seed}"
+    failure = Failure(failed.reason, failed.text)
+    path.write_text(failure_text(what, identity.setup, identity.bad_name, failed.x, failed.physics, failure))
     return path
 
 

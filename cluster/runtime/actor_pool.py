@@ -70,7 +70,8 @@ class Pool(Generic[Item, Result]):
 
     Args:
         spawn: starts one actor, which has a method `ready`, and returns its handle.
-        submit: hands an item to an actor and returns the object reference of its result.
+        submit: hands an item to an actor and returns the object reference of its result; it is told how many
+            actors were lost with the item before.
         size: how many actors there are at first.
         limits: of the work in flight.
         most: how many actors there may be, as CPUs become free; `size` if that is more.
@@ -80,7 +81,7 @@ class Pool(Generic[Item, Result]):
         self,
         *,
         spawn: Callable[[], Any],
-        submit: Callable[[Any, Item], Any],
+        submit: Callable[[Any, Item, int], Any],
         size: int,
         limits: Limits,
         most: int = 0,
@@ -93,6 +94,7 @@ class Pool(Generic[Item, Result]):
         self._queue: deque[Item] = deque()
         self._attempts: Counter[Item] = Counter()
         self._machines: Counter[Item] = Counter()
+        self._deaths: Counter[Item] = Counter()
 
     @property
     def answers(self) -> list[Any]:
@@ -133,7 +135,7 @@ class Pool(Generic[Item, Result]):
                 item = self._queue.popleft()
                 if not member.tasks:
                     member.since = time.monotonic()
-                member.tasks[self._submit(member.actor, item)] = item
+                member.tasks[self._submit(member.actor, item, self._deaths[item])] = item
 
     def _take_finished(self) -> Iterator[Done[Item, Result] | Failed[Item]]:
         pending = self._actors.starting()
@@ -181,6 +183,7 @@ class Pool(Generic[Item, Result]):
         failed, *waiting = self._actors.replace(member)
         self._queue.extendleft(reversed(waiting))
         (self._machines if has_left else self._attempts)[failed] += 1
+        self._deaths[failed] += not has_left
         yield self._failure(failed, f"its machine left: {error}" if has_left else error, text, None)
 
     def _failure(self, item: Item, error: str, text: str, cause: BaseException | None) -> Failed[Item]:

@@ -22,6 +22,7 @@ from svaedc.training.loop import require_settings
 from svaedc.training.presets import usual_stride
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.notes import notes
 from workers.dataset.storage.location import Location
 from workers.dataset.storage.s3_connection import StoreError
 
@@ -98,6 +99,8 @@ def _summary(plan: _Plan, settings: TrainSettings, session: Session, tracker: Tr
     if summary is not None:
         say(f"{model / MODEL} is already trained: nothing to do")
         return summary
+    for note in notes(plan.dataset):
+        say(f"note: {note}")
     placement = placement_of(settings, free_machines(session)) if trained < plan.updates else None
     with _run(plan, tracker, settings) as run:
         if placement is not None:

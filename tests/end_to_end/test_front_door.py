@@ -16,6 +16,7 @@ from cluster.comparison.records import RunKey
 from cluster.comparison.worker import ComparisonJob
 from cluster.errors import UsageError, UserError
 from workers import setups
+from workers.attempts import Attempts
 
 NOTEBOOK = Path(__file__).parents[2] / "examples" / "ten_trials.ipynb"
 SETUP = "quadratic-30d"
@@ -55,8 +56,8 @@ def test_the_optimiser_asks_for_what_the_comparison_of_its_seed_tries(tmp_path):
     (tmp_path / "runs").mkdir()
     job = ComparisonJob(ComparisonFolder(tmp_path), SETUP, "paper", "", pool_size=60, initial=2, trials=3)
     setup = setups.load(SETUP)
-    with setup.open() as environment:
-        run = list(job.run(RunKey("se", 1000), setup, environment))
+    with Attempts(setup) as attempts:
+        run = list(job.run(RunKey("se", 1000), setup, attempts))
     assert [trial.x.tobytes() for trial in asked.trials] == [trial.x.tobytes() for trial in run]
     assert [(trial.f, trial.best, trial.status) for trial in asked.trials] == [
         (trial.f, trial.best, trial.status) for trial in run

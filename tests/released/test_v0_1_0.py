@@ -26,6 +26,7 @@ from svaedc.model import checkpoint
 from svaedc.training.config import StageSettings, TrainingSettings, Weighting
 from svaedc.training.loop import fit
 from workers import setups
+from workers.attempts import Attempts
 from workers.collection.recompute import rederive
 from workers.dataset.folder import open_dataset
 from workers.dataset.identity import identity_of
@@ -119,8 +120,8 @@ def test_a_comparison_goes_on_with_the_same_controllers(tmp_path):
     for key in (RunKey("random", 1), RunKey("se", 0)):
         path = key.path(folder.path)
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:3]))
-        with setup.open() as environment:
-            assert len(list(job.run(key, setup, environment))) == 2
+        with Attempts(setup) as attempts:
+            assert len(list(job.run(key, setup, attempts))) == 2
         for again, trial in zip(folder.trials(key), runs[key], strict=True):
             np.testing.assert_array_equal(again.x, trial.x)
             assert again.f == trial.f

@@ -29,10 +29,9 @@ def test_equal_ranges_have_one_text():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("friction=2:1", r"friction must satisfy 0 <= low <= high, got \[2.0, 1.0\]"),
-        ("friction=-1:1", r"friction must satisfy 0 <= low <= high, got \[-1.0, 1.0\]"),
-        ("friction=nan", "friction must satisfy 0 <= low <= high"),
-        ("friction=1:inf", "friction must satisfy 0 <= low <= high"),
+        ("friction=2:1", r"friction must satisfy low <= high, got \[2.0, 1.0\]"),
+        ("friction=nan", "physics range of friction must be two finite numbers"),
+        ("friction=1:inf", "physics range of friction must be two finite numbers"),
         ("friction=", "must be written NAME=LOW:HIGH or NAME=VALUE, got 'friction='"),
         ("friction=1:", "must be written NAME=LOW:HIGH or NAME=VALUE, got 'friction=1:'"),
         ("friction=slippery", "got 'friction=slippery'"),

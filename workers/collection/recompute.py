@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from jaxtyping import Bool
 
+from workers.collection.independence import order_dependence
 from workers.collection.shard import roll_out
 from workers.dataset import schema
 from workers.dataset.folder import Dataset
@@ -14,7 +15,7 @@ from workers.dataset.inventory import lost_shards
 from workers.dataset.replacement import Repair, replace
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard, sha256
-from workers.dataset.storage.location import fetch
+from workers.dataset.storage.location import Location, fetch
 from workers.dataset.verification import Defect, file_problems
 from workers.setups import Setup
 
@@ -39,7 +40,9 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
     """Roll out a shard again and compare the bytes of the two files; nothing is changed.
 
     Bytes that differ are compared once more as numbers, because another processor may round otherwise, and
-    another version of PyArrow may write the same episodes as other bytes.
+    another version of PyArrow may write the same episodes as other bytes. Two episodes are rolled out in
+    another order as well: an environment that keeps something of the episode before gives the same bytes in
+    the same order.
 
     Args:
         setup: of the dataset.
@@ -51,15 +54,20 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
     """
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
-        _write(setup, dataset, shard, again)
+        episodes = roll_out(setup, dataset, shard)
+        schema.write(again, dataset.identity, shard.start, episodes)
         kept = fetch(dataset.path(shard))
-        if sha256(again) == sha256(kept):
-            return []
-        try:
-            what = _difference(schema.read(kept, dataset.identity), schema.read(again, dataset.identity))
-        except ValueError as error:
-            what = str(error)
-    return [Defect(shard.name, what)]
+        problems = [] if sha256(again) == sha256(kept) else [_told_difference(kept, again, dataset)]
+    seed, repeats = dataset.identity.seed, dataset.identity.repeats
+    problems.append(order_dependence(setup, seed, repeats, shard.start, episodes))
+    return [Defect(shard.name, problem) for problem in problems if problem]
+
+
+def _told_difference(kept: Location, again: Path, dataset: Dataset) -> str:
+    try:
+        return _difference(schema.read(kept, dataset.identity), schema.read(again, dataset.identity))
+    except ValueError as error:
+        return str(error)
 
 
 def find_broken(dataset: Dataset) -> Iterator[tuple[Shard, bool]]:

@@ -1,18 +1,46 @@
 """Collecting one shard: the whole of a rollout worker's job."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from workers.attempts import Attempts
+from workers.collection.independence import order_dependence
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.storage.temporary import host
-from workers.rollout import DIVERGED, Episode, random_episode
+from workers.isolation import IsolatedAttempts
+from workers.physics import Physics
+from workers.rollout import DIVERGED, FAILED, UNUSABLE, Episode, draw, rollout, storable
 from workers.setups import SETUPS, Setup
+from workers.tasks.task import require_objective
+from workers.user_code import UserCodeError, describe
+
+KEPT_FAILURES = 3
+"""A report tells of so many failed episodes in full; of the others it has the number."""
+
+
+@dataclass(frozen=True)
+class FailedEpisode:
+    """An episode that came to no end.
+
+    Attributes:
+        index: of the episode.
+        x: the controller, D numbers in [0, 1].
+        physics: that it ran under.
+        reason: in one line; type, message, file and line where they are known.
+        text: all that is known, a traceback as a rule.
+    """
+
+    index: int
+    x: tuple[float, ...]
+    physics: Physics
+    reason: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -30,6 +58,10 @@ class ShardReport:
         storage_seconds: CPU time in encoding, hashing and writing.
         seconds: wall time of both.
         machine: the host name of the machine that did it.
+        failed: episodes that raised, hung or ended their process.
+        failures: the first of them, in full.
+        leak: how an episode differs when it is rolled out in another order; "" where it does not, or was
+            not tried.
     """
 
     shard: Shard
@@ -42,6 +74,13 @@ class ShardReport:
     storage_seconds: float
     seconds: float
     machine: str
+    failed: int = 0
+    failures: tuple[FailedEpisode, ...] = ()
+    leak: str = ""
+
+
+RollOut = Callable[[Setup, Dataset, Shard], list[Episode]]
+"""It makes the episodes of a shard, in the order of their indices."""
 
 
 def require_working(setup: Setup, seed: int) -> None:
@@ -52,40 +91,55 @@ def require_working(setup: Setup, seed: int) -> None:
         seed: of the dataset; its episode 0 is the one rolled out.
 
     Raises:
-        ValueError: something in their code is not as it must be, such as the shape of what G_bad returns, or
-            an objective that is no finite number.
+        UserCodeError: something in their code is not as it must be, such as the shape of what G_bad returns,
+            or an objective that is no finite number; or it raised, and the message says what and where.
         OSError: a file of theirs is missing.
     """
-    if setup.name not in SETUPS or setup.task.bad_name:
+    if not is_of_users(setup):
+        return
+    try:
         with setup.open() as environment:
-            random_episode(setup, environment, seed, 0)
+            episode = rollout(setup, environment, *draw(setup, seed, 0))
+        require_objective(setup.task, episode.f)
+    except (UserCodeError, OSError):
+        raise
+    except Exception as error:  # users' code may raise anything
+        raise UserCodeError(
+            f"{setup.name} does not work: episode 0 of seed {seed} raised {describe(error)}"
+        ) from error
 
 
-def roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
+def is_of_users(setup: Setup) -> bool:
+    """Whether users supplied the robot or its G_bad."""
+    return setup.name not in SETUPS or bool(setup.task.bad_name)
+
+
+def roll_out(
+    setup: Setup,
+    dataset: Dataset,
+    shard: Shard,
+    attempts: Callable[[Setup], Attempts | IsolatedAttempts] = Attempts,
+) -> list[Episode]:
     """Roll out the episodes of a shard, in a fresh simulation.
 
     Args:
         setup: of the dataset.
         dataset: whose seed and repeats hold.
         shard: which episodes.
+        attempts: rolls them out, in this process or in one of their own.
 
     Returns:
-        The episodes, in the order of their indices.
+        The episodes, in the order of their indices; those whose code raised have failed, and say why.
     """
     seed, repeats = dataset.identity.seed, dataset.identity.repeats
-    with setup.open() as environment:
-        return [
-            random_episode(setup, environment, seed, index, repeats)
-            for index in range(shard.start, shard.stop)
-        ]
+    with attempts(setup) as trying:
+        episodes = trying.rollouts(
+            draw(setup, seed, index, repeats) for index in range(shard.start, shard.stop)
+        )
+    return [storable(setup, episode) for episode in episodes]
 
 
-def collect_shard(
-    setup: Setup,
-    dataset: Dataset,
-    shard: Shard,
-    roll_out: Callable[[Setup, Dataset, Shard], list[Episode]] = roll_out,
-) -> ShardReport:
+def collect_shard(setup: Setup, dataset: Dataset, shard: Shard, roll_out: RollOut = roll_out) -> ShardReport:
     """Roll out the episodes of a shard and commit its file.
 
     Args:
@@ -106,11 +160,15 @@ def collect_shard(
     path = shards.commit(
         dataset.folder, shard, lambda target: schema.write(target, dataset.identity, shard.start, episodes)
     )
+    stops = [episode.stop for episode in episodes]
     return ShardReport(
         shard=shard,
         badness=float(np.mean([episode.y for episode in episodes])),
-        diverged=sum(episode.stop == DIVERGED for episode in episodes),
-        stopped=sum(episode.stop not in ("", DIVERGED) for episode in episodes),
+        diverged=stops.count(DIVERGED),
+        stopped=sum(stop not in UNUSABLE | {""} for stop in stops),
+        failed=stops.count(FAILED),
+        failures=tuple(_failures(shard, episodes))[:KEPT_FAILURES],
+        leak=_leak(setup, dataset, shard, episodes),
         best=max(episode.f for episode in episodes),
         size=path.stat().st_size,
         rollout_seconds=rolled_out - begin,
@@ -118,6 +176,22 @@ def collect_shard(
         seconds=time.monotonic() - started,
         machine=host(),
     )
+
+
+def _failures(shard: Shard, episodes: list[Episode]) -> Iterator[FailedEpisode]:
+    for index, episode in enumerate(episodes, start=shard.start):
+        if episode.failure is not None:
+            failure = episode.failure
+            yield FailedEpisode(
+                index, tuple(episode.x.tolist()), episode.physics, failure.reason, failure.text
+            )
+
+
+def _leak(setup: Setup, dataset: Dataset, shard: Shard, episodes: list[Episode]) -> str:
+    """Try episodes of a dataset's first shard in another order, if users supplied the robot."""
+    if shard.start or not is_of_users(setup):
+        return ""
+    return order_dependence(setup, dataset.identity.seed, dataset.identity.repeats, shard.start, episodes)
 
 
 def require_same_code(setup: Setup, dataset: Dataset) -> None:

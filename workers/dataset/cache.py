@@ -17,7 +17,7 @@ from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location
 from workers.dataset.storage.temporary import is_dead, writer
-from workers.rollout import DIVERGED, degrees, stride_steps
+from workers.rollout import UNUSABLE, degrees, stride_steps
 
 _CHANGED = "{} was changed while it was decoded; let whatever repairs or replaces it end, and run this again"
 
@@ -98,7 +98,13 @@ def _build(dataset: Dataset, shards: Sequence[Shard], fingerprint: str, stride: 
     sane = {shard: dataset.sane_episodes(shard) for shard in shards}
     count = sum(sane.values())
     if count == 0:
-        raise ValueError(f"{dataset.folder} holds no episodes to train on; collect some first")
+        held = dataset.episodes()
+        raise ValueError(
+            f"all {held} episodes of {dataset.folder} diverged or failed, there is nothing to learn from: "
+            f"`svaedc dataset info {dataset.folder}` says more"
+            if held
+            else f"{dataset.folder} holds no episodes to train on; collect some first"
+        )
     folder.parent.mkdir(parents=True, exist_ok=True)
     _sweep(folder.parent)
     layout = _layout(dataset.identity, stride, count)
@@ -182,7 +188,7 @@ def _decode(
 
 
 def _subsample(columns: Columns, steps: slice) -> dict[str, np.ndarray]:
-    sane = np.array([stop != DIVERGED for stop in columns.stop])
+    sane = np.array([stop not in UNUSABLE for stop in columns.stop])
     return {
         "episode": columns.episode[sane],
         "x": columns.x[sane],

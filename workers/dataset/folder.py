@@ -14,7 +14,7 @@ from workers.dataset.manifest import MANIFEST, ensure_manifest, manifest_text
 from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
-from workers.rollout import DIVERGED, Episode
+from workers.rollout import UNUSABLE, Episode
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class Dataset:
         return sum(shard.episodes for shard in self.shards())
 
     def sane_episodes(self, shard: Shard) -> int:
-        """How many episodes of a shard a model may learn from: all but the diverged ones."""
+        """How many episodes of a shard a model may learn from: all but the diverged and the failed ones."""
         stops = read_stops(self.path(shard), self.identity)
-        return len(stops) - stops.count(DIVERGED)
+        return sum(stop not in UNUSABLE for stop in stops)
 
     def size(self) -> int:
         """Bytes of the finished shards."""

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from workers.dataset.folder import Dataset
-from workers.rollout import DIVERGED
+from workers.rollout import UNUSABLE
 
 TRAJECTORIES = 1_000
 """At most so many episodes are used for the share of ξ."""
@@ -98,8 +98,8 @@ def _between_controllers(channel: Float32[np.ndarray, "controllers repeats time"
 def _whole(
     episode: Sequence[int], stop: Sequence[str], repeats: int
 ) -> Int64[np.ndarray, "controllers repeats"]:
-    """Rows, in ascending episodes, of the controllers of which every repeat is there and none diverged."""
-    sane = np.flatnonzero([reason != DIVERGED for reason in stop])
+    """Rows, in ascending episodes, of the controllers of which every repeat may be learnt from."""
+    sane = np.flatnonzero([reason not in UNUSABLE for reason in stop])
     numbers = np.asarray(episode, dtype=np.int64)[sane] // repeats
     _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
     return sane[first[counts == repeats][:, None] + np.arange(repeats)]

@@ -9,7 +9,7 @@ from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
 from workers.dataset.schema import Bad
-from workers.rollout import DIVERGED
+from workers.rollout import DIVERGED, FAILED, UNUSABLE
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """These quantiles describe the objective."""
@@ -17,13 +17,14 @@ MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 @dataclass(frozen=True)
 class Statistics:
-    """Every episode counts alike, in whatever file it is; the diverged ones count as entirely bad.
+    """Every episode counts alike, in whatever file it is; the diverged and failed ones count as entirely bad.
 
     Attributes:
         objective: quantiles of f at `MARKS`.
         badness: mean y, in [0, 1].
         bad_steps: the share of steps in which each condition was bad, or the mean degree, by its name.
         diverged: how many episodes diverged.
+        failed: how many episodes raised, hung or ended their process.
         stopped: how many episodes a stop rule ended, by its reason, in the order of the alphabet.
     """
 
@@ -31,6 +32,7 @@ class Statistics:
     badness: float
     bad_steps: Mapping[str, float]
     diverged: int
+    failed: int
     stopped: Mapping[str, int]
 
 
@@ -57,7 +59,8 @@ def statistics(dataset: Dataset) -> Statistics:
         badness=badness / len(f),
         bad_steps=dict(zip(dataset.identity.conditions, (bad / steps).tolist(), strict=True)),
         diverged=stops[DIVERGED],
-        stopped={reason: stops[reason] for reason in sorted(stops.keys() - {"", DIVERGED})},
+        failed=stops[FAILED],
+        stopped={reason: stops[reason] for reason in sorted(stops.keys() - UNUSABLE - {""})},
     )
 
 

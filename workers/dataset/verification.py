@@ -14,7 +14,7 @@ from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
 from workers.physics import PhysicsRanges
 from workers.randomness import Stream, generator
-from workers.rollout import DIVERGED, degrees
+from workers.rollout import UNUSABLE, degrees
 from workers.tasks.stop import STOPPED
 
 
@@ -104,18 +104,18 @@ def _row_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[st
 
 
 def _stop_problems(columns: Columns, identity: Identity) -> Iterator[str]:
-    """Diverged episodes are bad throughout, stopped ones from the step of the reason on, others never."""
+    """Diverged and failed episodes are bad throughout, stopped ones from the reason on, others never."""
     reasons = np.array(columns.stop)
-    diverged = reasons == DIVERGED
-    if not np.all(columns.bad[diverged]):
-        yield "a diverged episode has steps that are not bad"
+    useless = np.isin(reasons, list(UNUSABLE))
+    if not np.all(columns.bad[useless]):
+        yield "a diverged or failed episode has steps that are not bad"
     if identity.bad_kind == "graded":
-        if np.any(columns.bad[~diverged & (reasons != ""), -1] != 1.0):
+        if np.any(columns.bad[~useless & (reasons != ""), -1] != 1.0):
             yield "a stopped episode ends with a step that is not bad"
         return
     bit = 1 << identity.conditions.index(STOPPED) if STOPPED in identity.conditions else 0
-    stopped = (columns.bad[~diverged] & bit) != 0
-    if not np.array_equal(stopped[:, -1], reasons[~diverged] != ""):
+    stopped = (columns.bad[~useless] & bit) != 0
+    if not np.array_equal(stopped[:, -1], reasons[~useless] != ""):
         yield f"its stop reasons do not fit the condition {STOPPED!r} of the last steps"
     if np.any(stopped[:, :-1] > stopped[:, 1:]):
         yield "an episode goes on after it was stopped"

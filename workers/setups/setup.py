@@ -4,12 +4,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from workers import plain
 from workers.controllers.controller import Controller
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges, ranges
 from workers.setups.names import require_known
 from workers.tasks.stop import STOPPED, StopRule, never
 from workers.tasks.task import BITS, Task
+from workers.user_code import UserCodeError
 
 
 @dataclass(frozen=True)
@@ -50,20 +52,63 @@ class Setup:
     broken: float = math.nan
 
     def __post_init__(self) -> None:
-        """Refuse bad conditions that the bits of a step cannot hold, or that cannot be told apart."""
+        """Make what a module states plain, and refuse what no dataset or optimisation can work with.
+
+        Raises:
+            UserCodeError: naming the field, what it is, and what it must be.
+        """
+        self._make_plain()
+        self._require_names()
+        self._require_conditions()
+
+    def _make_plain(self) -> None:
+        """Scalars of NumPy become Python's numbers: they are written into JSON, and compared."""
+        name = plain.text(self.name, "the name of a setup")
+        broken = plain.plain(self.broken)
+        stated = {
+            "name": name,
+            "horizon": plain.count(self.horizon, f"horizon of {name}"),
+            "control_step": plain.positive(self.control_step, f"control_step of {name}"),
+            "objective_limits": plain.interval(self.objective_limits, f"objective_limits of {name}"),
+            "success": plain.finite(self.success, f"success of {name}"),
+            "observation": tuple(self.observation),
+            "broken": broken if broken != broken else plain.finite(broken, f"broken of {name}"),
+        }
+        for field, value in stated.items():
+            object.__setattr__(self, field, value)
+
+    def _require_names(self) -> None:
+        """Channels, parameters and physics are told apart by their names."""
+        if not self.observation or not self.controller.parameters:
+            raise UserCodeError(
+                f"{self.name} must have at least one channel of ξ and one parameter of its controller, got "
+                f"{len(self.observation)} and {len(self.controller.parameters)}"
+            )
+        plain.distinct((each.name for each in self.observation), f"the channels of {self.name}")
+        plain.distinct((each.name for each in self.controller.parameters), f"the parameters of {self.name}")
+        for level, gap in self.gaps.items():
+            odd = sorted(gap.intervals.keys() ^ self.physics.intervals.keys())
+            if odd:
+                raise UserCodeError(
+                    f"gap {level!r} of {self.name} must have a range for every physics parameter of data "
+                    f"collection and for no other; missing or unknown: {', '.join(odd)}"
+                )
+
+    def _require_conditions(self) -> None:
+        """A step has so many bits, and each condition a name of its own."""
         names, graded = self.task.conditions, self.task.graded
         if graded and len(names) != 1:
-            raise ValueError(
+            raise UserCodeError(
                 f"{self.name} has a graded task, which must have one name in `conditions`, that of its "
                 f"degree, got {len(names)}: {', '.join(names)}; leave one"
             )
         if not 1 <= len(self.conditions) <= BITS:
-            raise ValueError(
+            raise UserCodeError(
                 f"{self.name} must have 1 to {BITS} bad conditions, {STOPPED!r} of a stop rule included, got "
                 f"{len(self.conditions)}: {', '.join(self.conditions)}; join some of them"
             )
         if len({*names}) != len(names) or (STOPPED in names and not graded):
-            raise ValueError(
+            raise UserCodeError(
                 f"the bad conditions of {self.name} must differ, and none be called {STOPPED!r}, got "
                 f"{', '.join(names)}; rename one"
             )
@@ -99,6 +144,11 @@ class Setup:
             return self.gaps[require_known(level, "gap level", self.gaps)]
         fixed = {name: (value, value) for name, value in self.physics.middle().items()}
         written = ranges(level).intervals
-        for name in written:
+        for name, (low, _) in written.items():
             require_known(name, "physics parameter", fixed)
+            if low < 0 <= self.physics.intervals[name][0]:
+                raise ValueError(
+                    f"{name} of {self.name} is never below 0 in data collection, so a gap's range must "
+                    f"satisfy 0 <= low <= high, got {level!r}"
+                )
         return PhysicsRanges({**fixed, **written})

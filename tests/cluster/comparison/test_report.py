@@ -12,6 +12,7 @@ from cluster.comparison.records import RunKey
 from cluster.comparison.report import lines, publish, summary_of
 from cluster.comparison.worker import ComparisonJob
 from workers import setups
+from workers.attempts import Attempts
 from workers.tasks.quadratic import Quadratic
 
 
@@ -34,8 +35,8 @@ def job_in(folder) -> ComparisonJob:
 
 
 def run(job: ComparisonJob, key: RunKey) -> None:
-    with SETUP.open() as environment:
-        for _ in job.run(key, SETUP, environment):
+    with Attempts(SETUP) as attempts:
+        for _ in job.run(key, SETUP, attempts):
             pass
 
 

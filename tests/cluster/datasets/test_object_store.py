@@ -41,7 +41,7 @@ def place(object_store, bucket, monkeypatch) -> str:
 def remote(place) -> Dataset:
     """Two shards of four episodes, collected by a rollout process."""
     dataset = begun(dataset_location(place), 4)
-    worker = RolloutActor(SETUP, str(dataset.folder))
+    worker = RolloutActor(SETUP, str(dataset.folder), 60.0)
     for shard in dataset.missing(8):
         worker.collect(shard)
     return dataset
@@ -93,7 +93,7 @@ def test_errors_of_shards_and_the_account_of_a_plan_are_kept_in_it(remote):
     path = put_aside(remote, missing, ["it failed"])
     assert "it failed" in path.read_text()
     assert quarantined_shards(remote, 12) == [missing]
-    RolloutActor(SETUP, str(remote.folder)).collect(missing)
+    RolloutActor(SETUP, str(remote.folder), 60.0).collect(missing)
     release(remote)
     assert quarantined_shards(remote) == []
     add_cost(remote, CollectionProgress(episodes=4), 1.0)

@@ -90,7 +90,7 @@ def die() -> None:
 
 
 def pool_of(spawn: Callable[[], Any], size: int, limits: Limits) -> Pool[str, str]:
-    return Pool(spawn=spawn, submit=lambda worker, item: worker.run.remote(item), size=size, limits=limits)
+    return Pool(spawn=spawn, submit=lambda worker, item, _: worker.run.remote(item), size=size, limits=limits)
 
 
 def outcomes(folder: Path, items: list[str], limits: Limits, size: int = 2) -> list[Done | Failed]:
@@ -188,7 +188,7 @@ def test_a_crew_that_may_grow_takes_the_cpus_that_become_free_and_no_more_than_t
     actor = ray.remote(Worker).options(num_cpus=1)
     pool = Pool(
         spawn=lambda: actor.remote(tmp_path),
-        submit=lambda worker, item: worker.run.remote(item),
+        submit=lambda worker, item, _: worker.run.remote(item),
         size=1,
         limits=PATIENT,
         most=9,

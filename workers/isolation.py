@@ -1,0 +1,140 @@
+"""Episodes in a process of their own: one that hangs or ends its process costs itself and nothing else."""
+
+import faulthandler
+import os
+import threading
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from workers.attempts import TIMEOUT_SECONDS, Attempts, Case
+from workers.controllers.controller import unit_cube
+from workers.physics import Physics
+from workers.rollout import Episode, Failure, failed_episode
+from workers.setups import Setup, load
+from workers.setups.user_bad import with_bad
+
+
+class IsolatedAttempts:
+    """Rolls out in a child process: an episode that hangs or ends its process fails, the next gets a new one.
+
+    Args:
+        setup: whose controllers are rolled out; the child loads it by its name.
+        timeout: longest duration of an episode, in s.
+    """
+
+    def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS) -> None:
+        self._setup = setup
+        self._timeout = timeout
+        self._folder = TemporaryDirectory(prefix="svaedc-")
+        self._child: ProcessPoolExecutor | None = None
+
+    def rollout(self, x: np.ndarray, physics: Physics) -> Episode:
+        """Roll out one controller.
+
+        Args:
+            x: the controller, [D], in [0, 1].
+            physics: a value for every parameter of the setup, by name.
+
+        Returns:
+            The episode, as `rollouts` gives it.
+        """
+        return self.rollouts([(x, physics)])[0]
+
+    def rollouts(self, cases: Iterable[Case]) -> list[Episode]:
+        """Roll out controllers, one after the other.
+
+        Args:
+            cases: controllers and their physics.
+
+        Returns:
+            An episode for each; those that raised, hung or ended their process have failed, and say why.
+
+        Raises:
+            ValueError: x is no controller of the setup.
+            OSError: the machine is in trouble; so does MemoryError.
+        """
+        return [self._attempt(unit_cube(x, self._setup.dimensions), physics) for x, physics in cases]
+
+    def _attempt(self, x: np.ndarray, physics: Physics) -> Episode:
+        was_fresh = self._child is None
+        try:
+            return self._executor().submit(_roll_out, x, dict(physics)).result()
+        except BrokenProcessPool:
+            self._child = None
+        return (
+            failed_episode(self._setup, x, physics, self._failure())
+            if was_fresh
+            else self._attempt(x, physics)
+        )
+
+    def _executor(self) -> ProcessPoolExecutor:
+        if self._child is None:
+            self._last.unlink(missing_ok=True)
+            self._child = ProcessPoolExecutor(
+                max_workers=1,
+                mp_context=get_context("spawn"),
+                initializer=_begin,
+                initargs=(self._setup.name, self._setup.task.bad_name, self._timeout, self._last),
+            )
+        return self._child
+
+    @property
+    def _last(self) -> Path:
+        return Path(self._folder.name) / "last_words.txt"
+
+    def _failure(self) -> Failure:
+        """What the child wrote when it died; nothing if it was killed, or left by `os._exit`."""
+        words = self._last.read_text(encoding="utf-8", errors="replace") if self._last.exists() else ""
+        if words.startswith("Timeout"):
+            return Failure(f"it took longer than {self._timeout:g} s", words)
+        told = words.partition("\n")[0].strip() or "killed from outside, or by its own exit, without a word"
+        return Failure(f"it ended its process: {told}", words or told)
+
+    def close(self) -> None:
+        """End the child."""
+        if self._child is not None:
+            self._child.shutdown()
+        self._child = None
+        self._folder.cleanup()
+
+    def __enter__(self) -> "IsolatedAttempts":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+_attempts: Attempts
+"""In a child, this rolls out."""
+_words: Any
+"""In a child, this file takes its last words; it stays open, for a crash cannot open one."""
+
+
+def _begin(setup: str, bad: str, timeout: float, last_words: Path) -> None:
+    global _attempts, _words
+    _words = last_words.open("w", encoding="utf-8")
+    faulthandler.enable(file=_words, all_threads=False)
+    _attempts = Attempts(with_bad(load(setup), bad), timeout, _words)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A parent that was killed has told nobody to end."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(1)
+
+
+def _roll_out(x: np.ndarray, physics: Physics) -> Episode:
+    return _attempts.rollout(x, physics)
