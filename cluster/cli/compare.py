@@ -13,7 +13,7 @@ def compare(
     setup: SetupName,
     out: Annotated[Path, typer.Option("--out", help="Folder of the results.", callback=durable)],
     methods: Annotated[
-        str, typer.Option("--methods", help="Names, separated by commas; see docs/methods.md.")
+        str, typer.Option("--methods", help="Names, separated by commas; see docs/reference/methods.md.")
     ] = ("random,screened-random,se,svae,svae-dc"),
     runs: Annotated[int, typer.Option("--runs", min=1, help="Seeds of each method.")] = 50,
     trials: Annotated[
