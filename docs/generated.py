@@ -48,8 +48,8 @@ def _section(name: str, source: Any) -> str:
         f"| {_one_line(described[key].docstring.value)} |"
         for key in model.model_fields
     ]
-    head = f"## {name}\n\n{described.docstring.value}\n\n| setting | type | default | meaning |\n|---|---|---|---|"
-    return "\n".join([head, *rows])
+    head = ["| setting | type | default | meaning |", "|---|---|---|---|"]
+    return "\n".join([f"## {name}", "", described.docstring.value, "", *head, *rows])
 
 
 def _kind(schema: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from markdown_it import MarkdownIt
@@ -62,10 +63,11 @@ def name(page: Path) -> str:
 
 def fences(page: Path) -> list[Fence]:
     """The fences of a page in order, each with the reason in the comment before it."""
-    text = page.read_text(encoding="utf-8")
-    whole = _PAGE_NOT_RUN.search(text)
+    tokens = _MARKDOWN.parse(page.read_text(encoding="utf-8"))
+    comments = "\n".join(token.content for token in tokens if token.type == "html_block")
+    whole = _PAGE_NOT_RUN.search(comments)
     found, reason = [], ""
-    for token in _MARKDOWN.parse(text):
+    for token in tokens:
         if token.type == "fence":
             found.append(_fence(token, whole.group(1) if whole else reason))
             reason = ""
@@ -139,11 +141,7 @@ def links(page: Path) -> Iterator[str]:
 def anchors(page: Path) -> set[str]:
     """What a link may name behind #: every heading, as GitHub and MkDocs both write it."""
     tokens = _MARKDOWN.parse(page.read_text(encoding="utf-8"))
-    headings = [
-        following.content
-        for token, following in zip(tokens, tokens[1:], strict=False)
-        if token.type == "heading_open"
-    ]
+    headings = [following.content for token, following in pairwise(tokens) if token.type == "heading_open"]
     return {slug(heading) for heading in headings}
 
 

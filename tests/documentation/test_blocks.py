@@ -11,7 +11,22 @@ SHOWN = ("text", "json", "yaml", "bibtex")
 """Fences in these languages are to be looked at."""
 every_page = pytest.mark.parametrize("page", PAGES, ids=name)
 
-NOT_RUN: dict[str, int] = {}
+NOT_RUN = {
+    "CONTRIBUTING.md": 1,
+    "README.md": 1,
+    "docs/how-to/clusters.md": 1,
+    "docs/how-to/drivers.md": 3,
+    "docs/how-to/export.md": 1,
+    "docs/how-to/object-stores.md": 1,
+    "docs/how-to/pictures.md": 1,
+    "docs/how-to/reproduce.md": 1,
+    "docs/how-to/train.md": 2,
+    "docs/results/daisy.md": 1,
+    "docs/results/franka.md": 3,
+    "docs/results/quadratic.md": 1,
+    "docs/results/reproduction.md": 1,
+    "docs/tutorial/first-steps.md": 2,
+}
 """So many blocks of these pages are not run; each says why in a comment above it."""
 
 

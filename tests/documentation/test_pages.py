@@ -19,5 +19,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_page_prints_what_it_says(page, tmp_path, home):
     wanted = list(steps(page))
     done = carry_out(wanted, tmp_path, home)
-    assert [complaint for each in done if (complaint := each.complaint())] == []
-    assert len(done) == len(wanted), f"the shell ended before line {wanted[len(done)].line}"
+    complaints = [complaint for each in done if (complaint := each.complaint())]
+    if len(done) < len(wanted):
+        complaints.append(f"the shell ended in line {wanted[len(done)].line}")
+    if complaints:
+        pytest.fail("\n\n".join(complaints), pytrace=False)
