@@ -86,9 +86,9 @@ class TrainSettings(Section):
     """So many training processes share the data of every update."""
     least_workers: PositiveInt | Literal["all"] = "all"
     """With fewer than `workers`, training starts and goes on with as many as there is room for."""
-    threads: PositiveInt | Literal["all"] = "all"
+    threads: PositiveInt | Literal["all"] = 1
     """Each process has so many threads, one CPU each; `all` shares the free CPUs among the processes, each on
-    one machine."""
+    one machine. A second thread gains next to nothing with these networks, and beside other work it loses."""
     updates: PositiveInt | Literal["preset"] = "preset"
     """Each stage makes so many gradient updates; fewer train faster and worse."""
     stride: PositiveInt | Literal["preset"] = "preset"

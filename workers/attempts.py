@@ -39,10 +39,13 @@ class Attempts:
         setup: whose controllers are rolled out.
         timeout: longest duration of an episode, in s.
         words: open file for the traceback of one that hangs.
+
+    Attributes:
+        setup: whose controllers are rolled out.
     """
 
     def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS, words: Any = sys.__stderr__) -> None:
-        self._setup = setup
+        self.setup = setup
         self._watchdog = _Watchdog(timeout, words)
         self._environment: Environment | None = None
 
@@ -72,7 +75,7 @@ class Attempts:
             OSError: the machine is in trouble; so does MemoryError.
         """
         with self._watchdog:
-            return [self._attempt(unit_cube(x, self._setup.dimensions), physics) for x, physics in cases]
+            return [self._attempt(unit_cube(x, self.setup.dimensions), physics) for x, physics in cases]
 
     def _attempt(self, x: np.ndarray, physics: Physics) -> Episode:
         was_fresh = self._environment is None
@@ -84,13 +87,13 @@ class Attempts:
             self.close()
             failure = Failure(describe(error), full_traceback(error))
         # What an episode before left behind is not this one's fault.
-        return failed_episode(self._setup, x, physics, failure) if was_fresh else self._attempt(x, physics)
+        return failed_episode(self.setup, x, physics, failure) if was_fresh else self._attempt(x, physics)
 
     def _roll_out(self, x: np.ndarray, physics: Physics) -> Episode:
         self._watchdog.watch()
         if self._environment is None:
-            self._environment = self._setup.open()
-        return rollout(self._setup, self._environment, x, physics)
+            self._environment = self.setup.open()
+        return rollout(self.setup, self._environment, x, physics)
 
     def close(self) -> None:
         """End the simulation, if there is one."""

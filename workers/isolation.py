@@ -94,9 +94,10 @@ class IsolatedAttempts:
         """What the child wrote when it died; nothing if it was killed, or left by `os._exit`."""
         words = self._last.read_text(encoding="utf-8", errors="replace") if self._last.exists() else ""
         if words.startswith("Timeout"):
-            return Failure(f"it took longer than {self._timeout:g} s", words)
+            rolling_out = words.rpartition("\n\n")[2]  # the main thread comes last
+            return Failure(f"it took longer than {self._timeout:g} s", rolling_out)
         told = words.partition("\n")[0].strip() or "killed from outside, or by its own exit, without a word"
-        return Failure(f"it ended its process: {told}", words or told)
+        return Failure(f"it ended its process: {told}", words.partition("\nExtension modules")[0] or told)
 
     def close(self) -> None:
         """End the child."""

@@ -8,6 +8,7 @@ import sys
 import typer
 
 from cluster.cli import dataset, hardware
+from cluster.cli.check import check
 from cluster.cli.collect import collect
 from cluster.cli.compare import compare
 from cluster.cli.demo import demo
@@ -26,13 +27,13 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
-    "A first look: `svaedc demo`. The steps on their own: `collect`, `train`, `compare`, `hardware`; "
-    "`render` shows an episode, `reproduce` makes a figure of the paper. "
+    "A first look: `svaedc demo`. The steps on their own: `check`, `collect`, `train`, `compare`, "
+    "`hardware`; `render` shows an episode, `reproduce` makes a figure of the paper. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
 
-for _command in (demo, collect, train, compare, ui, render, reproduce):
+for _command in (demo, check, collect, train, compare, ui, render, reproduce):
     app.command()(_command)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(hardware.app, name="hardware")

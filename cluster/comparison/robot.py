@@ -1,5 +1,7 @@
 """The hidden robot of one run: it tries controller after controller, and none of them ends the run."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +14,6 @@ from svaedc.bo.loop import Outcome
 from workers.attempts import Attempts
 from workers.isolation import IsolatedAttempts
 from workers.physics import Physics
-from workers.rollout import Episode
 from workers.setups import Setup
 
 
@@ -20,16 +21,12 @@ from workers.setups import Setup
 class HiddenRobot:
     """A setup under hidden physics, which evaluates the trials of a run in their order.
 
-    It notes which trial is under way. The process that goes on after one that ended meanwhile sees the note,
-    and evaluates that trial where it can end nothing but itself.
-
     Attributes:
         folder: of the comparison.
         key: of the run.
         setup: whose controllers are tried.
         physics: hidden from the method.
-        attempts: rolls out in this process.
-        timeout: longest duration of a trial, in s.
+        attempts: rolls out.
         next: index of the next trial.
     """
 
@@ -37,12 +34,11 @@ class HiddenRobot:
     key: RunKey
     setup: Setup
     physics: Physics
-    attempts: Attempts
-    timeout: float
+    attempts: Attempts | IsolatedAttempts
     next: int
 
     def evaluate(self, x: np.ndarray) -> Outcome:
-        """Try a controller.
+        """Try a controller; that it is under way is noted before.
 
         Args:
             x: the controller, [D], in the unit cube.
@@ -53,18 +49,38 @@ class HiddenRobot:
         Raises:
             OSError: the disk takes no more, or the machine is in trouble.
         """
-        episode = self._try_isolated(x) if self.folder.under_way(self.key) == self.next else self._try(x)
+        self.folder.begin(self.key, self.next)
+        episode = self.attempts.rollout(x, self.physics)
         if episode.failure is not None:
+            name, bad = self.setup.name, self.setup.task.bad_name
             what = f"trial {self.next} of run {self.key}"
-            told = failure_text(what, self.setup.name, "", x.tolist(), self.physics, episode.failure)
+            told = failure_text(what, name, bad, x.tolist(), self.physics, episode.failure)
             self.folder.keep_failure(self.key, self.next, told)
         self.next += 1
         return outcome_of(self.setup, episode)
 
-    def _try(self, x: np.ndarray) -> Episode:
-        self.folder.begin(self.key, self.next)
-        return self.attempts.rollout(x, self.physics)
 
-    def _try_isolated(self, x: np.ndarray) -> Episode:
-        with IsolatedAttempts(self.setup, self.timeout) as attempts:
-            return attempts.rollout(x, self.physics)
+@contextmanager
+def safe_attempts(
+    folder: ComparisonFolder, key: RunKey, trials: int, attempts: Attempts, timeout: float
+) -> Iterator[Attempts | IsolatedAttempts]:
+    """Chooses what rolls out the rest of a run.
+
+    A process that ended in the middle of a trial has left its note. Whatever ended it, the rest of the run is
+    rolled out where a trial can end nothing but itself.
+
+    Args:
+        folder: of the comparison.
+        key: of the run.
+        trials: how many of the run are recorded.
+        attempts: rolls out in this process.
+        timeout: longest duration of a trial, in s.
+
+    Yields:
+        These attempts, or isolated ones.
+    """
+    if folder.under_way(key) != trials:
+        yield attempts
+        return
+    with IsolatedAttempts(attempts.setup, timeout) as isolated:
+        yield isolated

@@ -12,7 +12,7 @@ from ray import tune
 
 from cluster.comparison.folder import ComparisonFolder
 from cluster.comparison.records import RunKey
-from cluster.comparison.robot import HiddenRobot
+from cluster.comparison.robot import HiddenRobot, safe_attempts
 from cluster.files import DISK_ERRORS
 from cluster.models import shared_model
 from cluster.optimization import Optimization, hidden_physics
@@ -86,20 +86,14 @@ class ComparisonJob:
         """
         planned, earlier = self.optimization(key, setup), self.folder.trials(key)
         physics = hidden_physics(setup, self.gap, key.run)
-        robot = HiddenRobot(
-            self.folder, key, setup, physics, attempts, self.episode_timeout, next=len(earlier)
-        )
-        for trial in trials(
-            planned.build(),
-            robot.evaluate,
-            np.stack([planned.initial(index) for index in range(self.initial)]),
-            self.trials,
-            planned.rng,
-            time.monotonic,
-            earlier,
-        ):
-            self.folder.append(key, trial)
-            yield trial
+        initial = np.stack([planned.initial(index) for index in range(self.initial)])
+        with safe_attempts(self.folder, key, len(earlier), attempts, self.episode_timeout) as safe:
+            robot = HiddenRobot(self.folder, key, setup, physics, safe, next=len(earlier))
+            for trial in trials(
+                planned.build(), robot.evaluate, initial, self.trials, planned.rng, time.monotonic, earlier
+            ):
+                self.folder.append(key, trial)
+                yield trial
         self.folder.end(key)
 
     def optimization(self, key: RunKey, setup: Setup) -> Optimization:

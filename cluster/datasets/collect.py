@@ -11,12 +11,10 @@ from cluster.errors import UserError
 from cluster.progress import duration, say
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
-from workers.collection.forecast import forecast
+from workers.collection.forecast import forecast, pilot_of
 from workers.dataset.folder import Dataset
 from workers.dataset.notes import notes
-
-PILOT_SHARDS = 4
-"""A plan rolls out that many shards, or two on every actor if that is more."""
+from workers.dataset.storage.presence import others_at_work, presence
 
 
 def collect(
@@ -47,9 +45,11 @@ def collect(
         return dataset
     actors = min(settings.actor_count(session.cpus), len(missing))
     session.preflight(actors)
-    with tracker.run(
-        f"collect {dataset.identity.setup}", "collect", plan.parameters(actors, settings)
-    ) as run:
+    warn_of_others(dataset)
+    with (
+        presence(dataset.folder),
+        tracker.run(f"collect {dataset.identity.setup}", "collect", plan.parameters(actors, settings)) as run,
+    ):
         counts = CollectionProgress(planned=episodes_in(missing))
         pool = rollout_pool(dataset, settings, actors, actor, growth(settings))
         try:
@@ -76,14 +76,18 @@ def collect_pilot(
     """
     dataset, missing = plan.dataset, plan.missing
     actors = min(settings.actor_count(session.cpus), len(missing))
-    pilot = missing[: max(PILOT_SHARDS, 2 * actors)]
+    pilot = pilot_of(missing, actors)
     if len(pilot) < 2:
         raise UserError(
             f"{episodes_in(missing)} episodes are left to collect in {dataset.folder}: too few to plan for; "
             "leave out --plan"
         )
     session.preflight(actors)
-    with tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run:
+    warn_of_others(dataset)
+    with (
+        presence(dataset.folder),
+        tracker.run(f"plan {dataset.identity.setup}", "plan", plan.parameters(actors, settings)) as run,
+    ):
         counts = CollectionProgress(planned=episodes_in(pilot))
         reports = roll_out(plan, pilot, counts, run, rollout_pool(dataset, settings, actors))
         if len(reports) < 2:
@@ -95,6 +99,15 @@ def collect_pilot(
         begin(dataset, plan.episodes, expected, counts)
         say(plan_text(expected, episodes_in([report.shard for report in reports])))
         run.metrics(counts.metrics() | metrics(expected), step=counts.episodes)
+
+
+def warn_of_others(dataset: Dataset) -> None:
+    """Say that another command collects into the same folder: what both roll out is kept once."""
+    for path in others_at_work(dataset.folder):
+        say(
+            f"warning: another collection is at work in {dataset.folder}: what both roll out is kept once, "
+            f"so this one may find little to do. If there is none any more, remove {path}"
+        )
 
 
 def _record(plan: CollectionPlan, counts: CollectionProgress, run: Run) -> None:

@@ -192,4 +192,5 @@ def in_one_line(error: RayError) -> str:
         return f"{type(error.cause).__name__}: {error.cause}".partition("\n")[0]
     lines = full_text(error).splitlines() or [type(error).__name__]
     # An actor's death ends with its reason; whatever else befalls it begins with that.
-    return lines[-1 if isinstance(error, RayActorError) else 0].strip()
+    told = lines[-1 if isinstance(error, RayActorError) else 0]
+    return told.partition(" Some common causes include")[0].strip()

@@ -23,6 +23,8 @@ from cluster.training.failures import DEATHS, explanation, is_death
 from cluster.training.reports import Reports
 from cluster.training.worker import TrainingJob, run_worker
 
+PASSIVE_WAITING = {"OMP_WAIT_POLICY": "PASSIVE", "GOMP_SPINCOUNT": "0"}
+"""Threads that wait for each other sleep: beside other work, spinning slows a training down many times."""
 _STARTS = 2
 """Ray Train tries so many starts of the processes anew; each waits a minute for its room."""
 
@@ -101,6 +103,7 @@ def _fit(job: TrainingJob, placement: Placement, box: Any) -> None:
             name=uuid.uuid4().hex,
             storage_path=str(storage),
             failure_config=FailureConfig(max_failures=0, controller_failure_limit=_STARTS),
+            worker_runtime_env={"env_vars": PASSIVE_WAITING},
         ),
     )
     try:

@@ -3,14 +3,48 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 
 import numpy as np
 from scipy.special import stdtrit
 
 from workers.collection.shard import ShardReport
+from workers.dataset.shards import Shard
 
 LEVEL = 0.9
 """This share of the intervals is to hold the true number, if shards are alike."""
+
+
+PILOT_SHARDS = 4
+"""A plan rolls out that many shards, or two on every actor if that is more."""
+PILOT_SHARE = 0.1
+"""A plan rolls out no more than this share of what it is made for."""
+
+
+def pilot_of(missing: Sequence[Shard], actors: int) -> list[Shard]:
+    """Choose the shards that a plan is made from: whole ones, or the beginnings of some in a small job.
+
+    Args:
+        missing: shards of the job, in order.
+        actors: that roll out at the same time.
+
+    Returns:
+        At least two shards, which hold a tenth of the episodes at most; none where that is not possible.
+    """
+    wanted = max(PILOT_SHARDS, 2 * actors)
+    most = int(PILOT_SHARE * sum(shard.episodes for shard in missing))
+    if sum(shard.episodes for shard in missing[:wanted]) <= most:
+        return list(missing[:wanted])
+    parts = min(wanted, most)
+    if parts < 2:
+        return []
+    size = most // parts
+    pieces = (
+        Shard(start, min(start + size, shard.stop))
+        for shard in missing
+        for start in range(shard.start, shard.stop, size)
+    )
+    return list(islice(pieces, parts))
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from jaxtyping import Bool
 
+from workers.attempts import Attempts
 from workers.collection.independence import order_dependence
-from workers.collection.shard import roll_out
+from workers.collection.shard import is_of_users, roll_out
 from workers.dataset import schema
 from workers.dataset.folder import Dataset
 from workers.dataset.inventory import lost_shards
@@ -17,6 +18,8 @@ from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard, sha256
 from workers.dataset.storage.location import Location, fetch
 from workers.dataset.verification import Defect, file_problems
+from workers.isolation import IsolatedAttempts
+from workers.rollout import Episode
 from workers.setups import Setup
 
 
@@ -54,7 +57,7 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
     """
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
-        episodes = roll_out(setup, dataset, shard)
+        episodes = _roll_out(setup, dataset, shard)
         schema.write(again, dataset.identity, shard.start, episodes)
         kept = fetch(dataset.path(shard))
         problems = [] if sha256(again) == sha256(kept) else [_told_difference(kept, again, dataset)]
@@ -96,7 +99,12 @@ def repair(setup: Setup, dataset: Dataset, shard: Shard) -> Repair:
 
 
 def _write(setup: Setup, dataset: Dataset, shard: Shard, path: Path) -> None:
-    schema.write(path, dataset.identity, shard.start, roll_out(setup, dataset, shard))
+    schema.write(path, dataset.identity, shard.start, _roll_out(setup, dataset, shard))
+
+
+def _roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
+    """Users' code may hang or end its process, and this process does other things besides."""
+    return roll_out(setup, dataset, shard, IsolatedAttempts if is_of_users(setup) else Attempts)
 
 
 def _difference(kept: Columns, again: Columns) -> str:

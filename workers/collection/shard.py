@@ -20,7 +20,7 @@ from workers.setups import SETUPS, Setup
 from workers.tasks.task import require_objective
 from workers.user_code import UserCodeError, describe
 
-KEPT_FAILURES = 3
+KEPT_FAILURES = 8
 """A report tells of so many failed episodes in full; of the others it has the number."""
 
 

@@ -47,8 +47,8 @@ class Dataset:
         return list(shards.missing(self.shards(), episodes, self.identity.episodes_per_shard))
 
     def episodes(self) -> int:
-        """How many episodes the finished shards hold."""
-        return sum(shard.episodes for shard in self.shards())
+        """How many episodes the finished shards hold, one that is in two of them once."""
+        return shards.episodes_in(self.shards())
 
     def sane_episodes(self, shard: Shard) -> int:
         """How many episodes of a shard a model may learn from: all but the diverged and the failed ones."""

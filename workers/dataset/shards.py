@@ -82,6 +82,15 @@ def missing(shards: Iterable[Shard], episodes: int, per_shard: int) -> Iterator[
             covered = end
 
 
+def episodes_in(present: Iterable[Shard]) -> int:
+    """Episodes that some shards hold; one that is in two of them counts once."""
+    total = covered = 0
+    for shard in sorted(present):
+        total += max(0, shard.stop - max(shard.start, covered))
+        covered = max(covered, shard.stop)
+    return total
+
+
 def commit(folder: Location, shard: Shard, write: Callable[[Path], None]) -> Location:
     """Write a shard aside and publish it whole; the first of several writers wins.
 

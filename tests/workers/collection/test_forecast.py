@@ -1,11 +1,14 @@
 """What is expected of a job, checked on jobs whose whole cost is known."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from workers.collection.forecast import Forecast, Prediction, forecast
+from workers.collection.forecast import Forecast, Prediction, forecast, pilot_of
 from workers.collection.shard import ShardReport
 from workers.dataset.shards import Shard
 
@@ -77,3 +80,23 @@ def test_what_is_no_forecast_is_refused(values):
 def test_a_pilot_of_one_shard_or_beyond_the_job_is_refused(costs, episodes):
     with pytest.raises(ValueError, match="at least 2 shards of the job"):
         forecast(reports(costs), episodes, actors=1)
+
+
+@given(
+    sizes=st.lists(st.integers(1, 256), min_size=1, max_size=40),
+    actors=st.integers(1, 16),
+)
+def test_a_pilot_is_a_tenth_of_the_job_at_most_and_cuts_no_other_episodes(sizes, actors):
+    starts = np.cumsum([0, *sizes]).tolist()
+    missing = [Shard(start, stop) for start, stop in pairwise(starts)]
+    pilot = pilot_of(missing, actors)
+    assert sum(shard.episodes for shard in pilot) <= sum(sizes) / 10
+    assert (len(pilot) >= 2) == (sum(sizes) >= 20)
+    held = [index for shard in pilot for index in range(shard.start, shard.stop)]
+    assert held == sorted(set(held))
+    assert all(any(one.start <= each.start and each.stop <= one.stop for one in missing) for each in pilot)
+
+
+def test_the_pilot_of_a_large_job_is_whole_shards():
+    missing = [Shard(start, start + 256) for start in range(0, 500_000, 256)]
+    assert pilot_of(missing, 3) == missing[:6]

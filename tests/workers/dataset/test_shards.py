@@ -82,6 +82,14 @@ def test_nothing_is_missing_once_the_missing_is_there(partial, episodes):
     assert list(shards.missing([*done, *new], episodes, per_shard)) == []
 
 
+@given(ranges=st.lists(st.tuples(st.integers(0, 60), st.integers(1, 20)), max_size=8))
+def test_an_episode_in_several_shards_counts_once(ranges):
+    present = [Shard(start, start + size) for start, size in ranges]
+    assert shards.episodes_in(present) == len(
+        {i for shard in present for i in range(shard.start, shard.stop)}
+    )
+
+
 def test_an_extension_completes_the_partial_file_with_a_further_one():
     assert list(shards.missing([], 300, 256)) == [Shard(0, 256), Shard(256, 300)]
     assert list(shards.missing([Shard(0, 256), Shard(256, 300)], 600, 256)) == [

@@ -1,0 +1,20 @@
+"""Every setup that ships, and the example of a user's own, passes what `svaedc check` asks of any robot."""
+
+import pytest
+
+from workers.conformance.remark import Severity
+from workers.conformance.sample import FEWEST, sample
+from workers.conformance.suite import CHECKS, find
+
+
+@pytest.fixture(scope="module")
+def looked_at(whole):
+    with sample(whole, seed=0, timeout=60.0, time_limit=1.0) as taken:
+        yield taken
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.name)
+def test_no_check_finds_a_mistake(check, looked_at):
+    assert len(looked_at.episodes) >= FEWEST
+    found = [finding for finding in find(check, looked_at) if finding.severity is Severity.MISTAKE]
+    assert found == []

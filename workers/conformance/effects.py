@@ -1,0 +1,132 @@
+"""Checks that need episodes of their own: what is commanded, what changes a trajectory, and Gymnasium."""
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+
+from workers.attempts import Attempts
+from workers.conformance.remark import Remark, Severity
+from workers.conformance.sample import Sample
+from workers.environments.environment import Channel
+from workers.gymnasium_environment import SetupEnvironment
+from workers.randomness import Stream, generator
+from workers.rollout import Episode, draw, rollout
+from workers.user_code import describe
+
+SECONDS = 10.0
+"""Each of these checks takes about so long."""
+ENOUGH = 20
+"""A physics parameter that shows in none of so many controllers is not used; some show in few only."""
+CONTROLLERS = 2
+"""A parameter of the controller is tried on so many of them."""
+
+
+def check_commands(sample: Sample) -> Iterator[Remark]:
+    """Environment and setup agree, and commands are what the environment's action channels say."""
+    with sample.setup.open() as environment:
+        for name, stated in (
+            ("observation", tuple(sample.setup.observation)),
+            ("control_step", sample.setup.control_step),
+        ):
+            own = getattr(environment, name, None)
+            own = tuple(own) if name == "observation" and own is not None else own
+            if own != stated:
+                text = (
+                    f"{name} of the environment is {own}, that of the setup {stated}; state one of them twice"
+                )
+                yield Remark("commands", Severity.MISTAKE, text)
+        commands: list[Any] = []
+        step = environment.step
+
+        def listen(command: Sequence[float]) -> Any:
+            commands.append(list(command))
+            return step(command)
+
+        environment.step = listen  # type: ignore[method-assign]
+        for index in list(sample.usable)[:CONTROLLERS]:
+            rollout(sample.setup, environment, *draw(sample.setup, sample.seed, index))
+        yield from _check_commands(commands, environment.action)
+
+
+def _check_commands(commands: list[Any], channels: Sequence[Channel]) -> Iterator[Remark]:
+    odd = next((command for command in commands if len(command) != len(channels)), None)
+    if odd is not None:
+        names = ", ".join(channel.name for channel in channels)
+        text = f"the controller commands {len(odd)} numbers, the environment's action has {len(channels)}"
+        yield Remark("commands", Severity.MISTAKE, f"{text} ({names}); make them agree")
+        return
+    for channel, values in zip(channels, np.array(commands, dtype=float).T, strict=True):
+        outside = values[~((values >= channel.low) & (values <= channel.high))]
+        if outside.size:
+            yield Remark(
+                "commands",
+                Severity.DOUBT,
+                f"the controller commands {outside[0]:.4g} {channel.unit} to {channel.name}, whose bounds "
+                f"are [{channel.low:g}, {channel.high:g}]; clip it, or widen the bounds",
+            )
+
+
+def check_physics(sample: Sample) -> Iterator[Remark]:
+    """Every physics parameter changes something."""
+    middle = sample.setup.physics.middle()
+    affordable = max(1, sample.affordable(SECONDS) // 2)
+    xs = [episode.x for episode in sample.usable.values()][:affordable]
+    with Attempts(sample.setup) as attempts:
+        for name, (low, high) in sample.setup.physics.intervals.items():
+            pairs = (attempts.rollouts([(x, {**middle, name: low}), (x, {**middle, name: high})]) for x in xs)
+            if low < high and all(_is_same(*pair) for pair in pairs):
+                yield Remark(
+                    "physics",
+                    Severity.MISTAKE if len(xs) >= ENOUGH else Severity.DOUBT,
+                    f"{name} changes nothing in {len(xs)} controllers: its two ends {low:g} and {high:g} "
+                    f"give the same trajectories; use physics[{name!r}] in reset(), or leave it out",
+                )
+
+
+def check_parameters(sample: Sample) -> Iterator[Remark]:
+    """Every parameter of the controller changes something."""
+    names = [parameter.name for parameter in sample.setup.controller.parameters]
+    bases = [sample.episodes[index].x for index in list(sample.usable)[:CONTROLLERS]]
+    affordable = max(1, sample.affordable(SECONDS) // (2 * max(len(bases), 1)))
+    order = generator(sample.seed, Stream.CONTROLLER, 0).permutation(len(names))[:affordable]
+    physics = sample.setup.physics.middle()
+    with Attempts(sample.setup) as attempts:
+        for place in sorted(order.tolist()):
+            pairs = [
+                attempts.rollouts([(_with(x, place, value), physics) for value in (0.1, 0.9)]) for x in bases
+            ]
+            if pairs and all(_is_same(*pair) for pair in pairs):
+                text = (
+                    f"parameter {names[place]} of the controller changes nothing in {len(bases)} controllers"
+                )
+                yield Remark("parameters", Severity.DOUBT, f"{text}; use it in start(), or leave it out")
+    if len(order) < len(names):
+        text = f"{len(order)} of {len(names)} parameters were tried, for want of time"
+        yield Remark("parameters", Severity.FACT, text)
+
+
+def _with(x: np.ndarray, place: int, value: float) -> np.ndarray:
+    changed = x.copy()
+    changed[place] = value
+    return changed
+
+
+def _is_same(one: Episode, other: Episode) -> bool:
+    return np.array_equal(one.xi, other.xi) and one.f == other.f and one.failure == other.failure
+
+
+def check_gymnasium(sample: Sample) -> Iterator[Remark]:
+    """Gymnasium's own checker has nothing against it."""
+    if not sample.usable:
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of bounds beyond [-1, 1] and of no registry, which are meant
+        try:
+            check_env(SetupEnvironment(replace(sample.setup)), skip_render_check=True)
+        except Exception as error:  # noqa: BLE001 - its checker raises anything, and so does users' code
+            text = f"Gymnasium's checker refuses it: {describe(error)}"
+            yield Remark("gymnasium", Severity.MISTAKE, text)
