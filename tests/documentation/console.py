@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.documentation.pages import ROOT, Step
 
-LONGEST_SECONDS = 900
+LONGEST_SECONDS = 3600
 _MARK = "=== documentation"
 _CHECK = doctest.OutputChecker()
 _LENIENT = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
