@@ -3,14 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-SOURCES := workers svaedc cluster tests $(wildcard benchmarks examples studies)
+SOURCES := workers svaedc cluster tests $(wildcard benchmarks docs examples studies)
 
 # Nothing here reports home.
 export RAY_USAGE_STATS_ENABLED := 0
 export MLFLOW_DISABLE_TELEMETRY := true
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test test-slow chaos bench studies check format clean
+.PHONY: help install demo test test-docs test-slow chaos bench studies docs check format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
@@ -35,6 +35,9 @@ test: $(STAMP) ## the tests that take seconds each
 	$(BIN)/python -m pytest $(CLUSTERS); clusters=$$?; \
 	wait $$computing; computed=$$?; cat $(COMPUTING); exit $$((clusters + computed))
 
+test-docs: $(STAMP) ## run every command of the documentation and compare what it prints; ten minutes
+	$(BIN)/python -m pytest -m documentation tests/documentation
+
 test-slow: $(STAMP) ## the tests that take minutes, and the property tests with fresh examples
 	HYPOTHESIS_PROFILE=exploring $(BIN)/python -m pytest -m "slow or hypothesis"
 
@@ -49,6 +52,9 @@ studies: $(STAMP) ## the learning curve and appendix A on DATASET=data/franka; h
 	$(BIN)/python -m studies.learning_curve --dataset $(DATASET)
 	$(BIN)/python -m studies.appendix_a --dataset $(DATASET)
 
+docs: $(STAMP) ## build the documentation into site/; warnings are errors
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
 check: $(STAMP) ## ruff, mypy and the import contracts
 	$(BIN)/ruff check $(SOURCES)
 	$(BIN)/ruff format --check $(SOURCES)
@@ -60,4 +66,4 @@ format: $(STAMP) ## sort imports and format
 	$(BIN)/ruff format $(SOURCES)
 
 clean: ## remove the environment and the tools' caches; data and results stay
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -16,7 +16,7 @@ def setups() -> None:
     from cluster.listing import listed_setups
 
     _show(listed_setups())
-    say("a setup of your own: --setup MODULE or MODULE:NAME (docs/plug-ins.md)")
+    say("a setup of your own: --setup MODULE or MODULE:NAME (docs/how-to/plug-ins.md)")
 
 
 def methods() -> None:
@@ -25,8 +25,8 @@ def methods() -> None:
 
     _show(listed_methods())
     say(
-        "most take -pool or -acqf, then -ucb or -ei, behind their name (docs/methods.md); a method of your "
-        "own: --methods MODULE:NAME (docs/plug-ins.md)"
+        "most take -pool or -acqf, then -ucb or -ei, behind their name (docs/reference/methods.md); a method of your "
+        "own: --methods MODULE:NAME (docs/how-to/plug-ins.md)"
     )
 
 
@@ -35,7 +35,7 @@ def robots() -> None:
     from cluster.listing import listed_robots
 
     _show(listed_robots())
-    say("a robot of your own: --robot MODULE:NAME (docs/plug-ins.md)")
+    say("a robot of your own: --robot MODULE:NAME (docs/how-to/plug-ins.md)")
 
 
 def _show(listed: "Iterable[Listed]") -> None:

@@ -1,6 +1,6 @@
 """What the steps of a reproduction cost, from costs of single episodes, updates and suggestions.
 
-They are CPU times of one core, measured as docs/benchmarks.md says; another machine has other ones, and
+They are CPU times of one core, measured as docs/results/benchmarks.md says; another machine has other ones, and
 `svaedc collect --plan` measures those of its own episodes.
 """
 
@@ -187,7 +187,7 @@ def lines(reproduction: Reproduction, items: Sequence[Item], cores: int) -> Iter
         )
     yield (
         f"on {cores} cores with nothing else to do, {free / 1e6:.0f} MB free; from costs that were measured "
-        "elsewhere (docs/reproduction.md): `svaedc collect --plan` measures those of a dataset here"
+        "elsewhere (docs/results/reproduction.md): `svaedc collect --plan` measures those of a dataset here"
     )
 
 

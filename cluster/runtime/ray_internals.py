@@ -3,7 +3,7 @@
 Ray's processes cost CPU time for as long as they live. `settings`, `quiet_agent` and `end_spectators` are
 what a cluster without the dashboard does without. All of it is there to be looked at in the dashboard, or to
 print at this terminal what workers print, which no command asks for. Workers that die are noticed, and memory
-is watched over, by the raylet and the head alone. `docs/benchmarks.md` says what each entry saves.
+is watched over, by the raylet and the head alone. `docs/results/benchmarks.md` says what each entry saves.
 """
 
 import os

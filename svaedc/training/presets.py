@@ -66,7 +66,7 @@ def compact(sizes: Sizes) -> Preset:
     150 CPU seconds with one thread: error relative to the median's .39 reconstructed and .59 generated from
     x; correlation of y .99 and .86; all 9 latent dimensions active. Without generation in the objective the
     generated error was .69, and a second stage that refits p(tau, psi|x) alone made .60 of .59
-    (docs/model.md has the table), so that stage has no updates here.
+    (docs/results/models.md has the table), so that stage has no updates here.
     """
     joint = StageSettings(
         updates=4_000,

@@ -17,7 +17,7 @@ from workers.hardware.robots import Robot
 from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
-PAGE = Path(__file__).parents[2] / "docs" / "hardware.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "drivers.md"
 REHEARSALS = [*sorted(robots.ROBOTS.keys() & setups.SETUPS.keys()), "rehearsal:quadratic-30d"]
 """Robots that are setups too are simulated; a test that connected another would move it."""
 

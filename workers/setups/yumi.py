@@ -47,7 +47,7 @@ UPPER = (2.353, 0.607, 1.0, 0.6, 4.049, 1.927, 3.197)
 
 REHEARSAL_SHARE = 0.2
 """The stand-in has this share of the arm's joint speeds, a reading of the paper's "1/5". The authors' code
-notes 0.1 for the robot, at which next to nothing is pushed (docs/yumi.md)."""
+notes 0.1 for the robot, at which next to nothing is pushed (docs/results/yumi.md)."""
 LOWEST_HAND = 0.09
 """The hand's frame must stay so many metres above the table; lower, the gripper is about to hit it."""
 
