@@ -1,7 +1,7 @@
 """What the steps of a reproduction cost, from costs of single episodes, updates and suggestions.
 
-They are CPU times of one core, measured as docs/results/benchmarks.md says; another machine has other ones, and
-`svaedc collect --plan` measures those of its own episodes.
+They are CPU times of one core, measured as docs/results/benchmarks.md says; another machine has other ones,
+and `svaedc collect --plan` measures those of its own episodes.
 """
 
 import shutil
