@@ -8,6 +8,7 @@ from ray import cloudpickle
 
 from cluster.errors import UserError
 from cluster.progress import say
+from cluster.rendering.episodes import first_physics
 from cluster.rendering.render import Drawing, render
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample, sample
@@ -74,7 +75,13 @@ _PICKLING = Check("pickling", "Ray can send it to other processes", _check_pickl
 def _draw(setup: Setup, seed: int, picture: Path) -> None:
     """The controller of episode 0; a robot without a picture is no mistake."""
     try:
-        render(setup, f"random:{seed}", seed, Drawing(picture, _WIDTH, _HEIGHT, None, _FPS, _STILLS), None)
+        render(
+            setup,
+            f"random:{seed}",
+            first_physics(setup, seed),
+            Drawing(picture, _WIDTH, _HEIGHT, None, _FPS, _STILLS),
+            None,
+        )
     except UserError as error:
         say(f"  {'no':8} {'picture':12} {error}")
 

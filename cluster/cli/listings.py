@@ -25,8 +25,8 @@ def methods() -> None:
 
     _show(listed_methods())
     say(
-        "most take -pool or -acqf, then -ucb or -ei, behind their name (docs/reference/methods.md); a method of "
-        "your own: --methods MODULE:NAME (docs/how-to/plug-ins.md)"
+        "most take -pool or -acqf, then -ucb or -ei, behind their name (docs/reference/methods.md); a method "
+        "of your own: --methods MODULE:NAME (docs/how-to/plug-ins.md)"
     )
 
 

@@ -8,28 +8,30 @@ import numpy as np
 
 from cluster.errors import UsageError, UserError
 from cluster.home import expand_home
-from cluster.inputs import dataset_location
+from cluster.inputs import dataset_location, usage_errors
+from cluster.progress import say
 from workers.controllers.controller import unit_cube
 from workers.dataset.folder import Dataset, open_dataset
 from workers.physics import Physics
 from workers.randomness import Stream, generator
 from workers.rollout import Episode, rollout
 from workers.setups import Setup
+from workers.user_code import describe, full_traceback
 
 FORMS = "random:SEED, dataset:FOLDER:INDEX, the path of an .npy file, or numbers separated by commas"
 
 
-def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
+def episode_to_draw(wanted: str, setup: Setup, physics: Physics | None) -> Episode:
     """Find the episode of a dataset, or roll a controller out.
 
     Args:
         wanted: one of `FORMS`.
         setup: what runs the controller.
-        seed: of the physics, drawn from the ranges of data collection. Without it an episode of a dataset
-            keeps its own, and other controllers run under the nominal physics.
+        physics: that it runs under. Without it an episode of a dataset keeps its own, and other controllers
+            run under the nominal physics.
 
     Returns:
-        The episode; one of a dataset is as it was recorded, unless a seed is given.
+        The episode; one of a dataset is as it was recorded, unless physics is given.
 
     Raises:
         UsageError: there is no such controller.
@@ -38,9 +40,31 @@ def episode_to_draw(wanted: str, setup: Setup, seed: int | None) -> Episode:
     kind, _, rest = wanted.partition(":")
     if kind == "dataset":
         recorded = _dataset_episode(wanted, rest, setup)
-        return recorded if seed is None else _roll_out(setup, recorded.x, first_physics(setup, seed))
+        return recorded if physics is None else _roll_out(setup, recorded.x, physics)
     x = _random(wanted, rest, setup) if kind == "random" else _controller(wanted, setup)
-    return _roll_out(setup, x, setup.physics.middle() if seed is None else first_physics(setup, seed))
+    return _roll_out(setup, x, setup.physics.middle() if physics is None else physics)
+
+
+def physics_of(setup: Setup, seed: int | None, written: str) -> Physics | None:
+    """The physics that a person asks for.
+
+    Args:
+        setup: whose physics.
+        seed: of a draw from the ranges of data collection; None for none.
+        written: values as `NAME=VALUE,...`; "" for none. What is not named is nominal.
+
+    Returns:
+        The parameters, by name; None where nothing is asked for.
+
+    Raises:
+        UsageError: both are asked for, or there is no such parameter.
+    """
+    if not written:
+        return None if seed is None else first_physics(setup, seed)
+    if seed is not None:
+        raise UsageError("--physics says what the physics is, and --seed draws it: leave one of them out")
+    with usage_errors():
+        return setup.gap(written if "=" in written else f"{written}=").middle()
 
 
 def first_physics(setup: Setup, seed: int) -> Physics:
@@ -57,8 +81,15 @@ def first_physics(setup: Setup, seed: int) -> Physics:
 
 
 def _roll_out(setup: Setup, x: np.ndarray, physics: Physics) -> Episode:
-    with setup.open() as environment:
-        return rollout(setup, environment, x, physics)
+    """Users' code may raise: whoever looks at one episode wants all of the traceback."""
+    try:
+        with setup.open() as environment:
+            return rollout(setup, environment, x, physics)
+    except OSError:
+        raise
+    except Exception as error:
+        say(full_traceback(error))
+        raise UserError(f"the episode of {setup.name} failed: {describe(error)}") from error
 
 
 def _random(wanted: str, seed: str, setup: Setup) -> np.ndarray:

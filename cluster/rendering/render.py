@@ -9,6 +9,7 @@ from cluster.rendering.episodes import episode_to_draw
 from cluster.rendering.frames import clip, drawable, pictures, stills, summary, usual_speed
 from cluster.rendering.model_frames import beside
 from cluster.rendering.video import STILLS, write
+from workers.physics import Physics
 from workers.setups import Setup
 
 
@@ -33,13 +34,13 @@ class Drawing:
     stills: int
 
 
-def render(setup: Setup, x: str, seed: int | None, drawing: Drawing, model: Path | None) -> None:
+def render(setup: Setup, x: str, physics: Physics | None, drawing: Drawing, model: Path | None) -> None:
     """Roll out an episode, draw it, and say what is seen.
 
     Args:
         setup: whose episode.
         x: its controller, in one of the forms of `cluster.rendering.episodes.FORMS`.
-        seed: of the physics; None for those of the dataset's episode, or nominal ones.
+        physics: of the episode; None for those of the dataset's episode, or nominal ones.
         drawing: how it is drawn.
         model: folder of a model that reconstructs and generates the episode beside it; None for none.
 
@@ -50,7 +51,7 @@ def render(setup: Setup, x: str, seed: int | None, drawing: Drawing, model: Path
     out = drawing.out
     size = drawable(setup, out, drawing.width, drawing.height)
     pace = usual_speed(setup) if drawing.speed is None else drawing.speed
-    episode = episode_to_draw(x, setup, seed)
+    episode = episode_to_draw(x, setup, physics)
     if out.suffix in STILLS:
         moments, note = stills(setup, episode, drawing.stills), setup.name
     else:

@@ -24,7 +24,7 @@ def test_a_seed_draws_the_physics_of_data_collection(setup):
 
     with setup.open() as environment:
         collected = random_episode(setup, environment, 7, 0)
-    shown = episode_to_draw("random:7", setup, 7)
+    shown = episode_to_draw("random:7", setup, first_physics(setup, 7))
     assert shown.physics == collected.physics
     assert shown.xi.tobytes() == collected.xi.tobytes()
     assert episode_to_draw("random:7", setup, None).physics["object1_mass"] == pytest.approx(2.0)
@@ -75,3 +75,31 @@ def test_an_episode_that_a_dataset_does_not_hold_is_refused(small_dataset):
         episode_to_draw(f"dataset:{small_dataset}:16", setups.load("franka"), None)
     with pytest.raises(UsageError, match="is of franka, not of daisy-11d; use --setup franka"):
         episode_to_draw(f"dataset:{small_dataset}:0", setups.load("daisy-11d"), None)
+
+
+def test_physics_are_drawn_or_given_to_the_last_bit_and_not_both():
+    setup = setups.load("franka")
+    drawn = first_physics(setup, 3)
+    assert physics_of(setup, 3, "") == drawn
+    assert physics_of(setup, None, "") is None
+    assert physics_of(setup, None, ",".join(f"{name}={value!r}" for name, value in drawn.items())) == drawn
+    given = physics_of(setup, None, "object1_mass=1.5")
+    assert given == setup.physics.middle() | {"object1_mass": 1.5}
+    with pytest.raises(UsageError, match="--physics says what the physics is, and --seed draws it"):
+        physics_of(setup, 3, "object1_mass=1.5")
+    with pytest.raises(
+        UsageError, match="unknown physics parameter 'object1_mas'; did you mean 'object1_mass'"
+    ):
+        physics_of(setup, None, "object1_mas=1.5")
+    with pytest.raises(UsageError, match="must be written NAME=LOW:HIGH or NAME=VALUE, got 'object1_mass='"):
+        physics_of(setup, None, "object1_mass")
+
+
+def test_an_episode_whose_code_raises_is_told_with_its_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(tmp_path)
+    write_robot(tmp_path, "raising", ("force = command[0]", 'force = {}["puck"]'))
+    with pytest.raises(
+        UserError, match=r"the episode of raising failed: KeyError: 'puck', at .*raising.py:\d+"
+    ):
+        episode_to_draw("random:7", setups.load("raising"), None)
+    assert "Traceback" in capsys.readouterr().err
