@@ -19,7 +19,7 @@ def test_a_controller_given_in_three_ways_is_the_same(setup, tmp_path):
 
 
 def test_a_seed_draws_the_physics_of_data_collection(setup):
-    from cluster.rendering.episodes import episode_to_draw
+    from cluster.rendering.episodes import episode_to_draw, first_physics
     from workers.rollout import random_episode
 
     with setup.open() as environment:
@@ -78,24 +78,33 @@ def test_an_episode_that_a_dataset_does_not_hold_is_refused(small_dataset):
 
 
 def test_physics_are_drawn_or_given_to_the_last_bit_and_not_both():
-    setup = setups.load("franka")
-    drawn = first_physics(setup, 3)
-    assert physics_of(setup, 3, "") == drawn
-    assert physics_of(setup, None, "") is None
-    assert physics_of(setup, None, ",".join(f"{name}={value!r}" for name, value in drawn.items())) == drawn
-    given = physics_of(setup, None, "object1_mass=1.5")
-    assert given == setup.physics.middle() | {"object1_mass": 1.5}
+    from cluster.errors import UsageError
+    from cluster.rendering.episodes import first_physics, physics_of
+    from workers import setups
+
+    franka = setups.load("franka")
+    drawn = first_physics(franka, 3)
+    assert physics_of(franka, 3, "") == drawn
+    assert physics_of(franka, None, "") is None
+    assert physics_of(franka, None, ",".join(f"{name}={value!r}" for name, value in drawn.items())) == drawn
+    given = physics_of(franka, None, "object1_mass=1.5")
+    assert given == franka.physics.middle() | {"object1_mass": 1.5}
     with pytest.raises(UsageError, match="--physics says what the physics is, and --seed draws it"):
-        physics_of(setup, 3, "object1_mass=1.5")
+        physics_of(franka, 3, "object1_mass=1.5")
     with pytest.raises(
         UsageError, match="unknown physics parameter 'object1_mas'; did you mean 'object1_mass'"
     ):
-        physics_of(setup, None, "object1_mas=1.5")
+        physics_of(franka, None, "object1_mas=1.5")
     with pytest.raises(UsageError, match="must be written NAME=LOW:HIGH or NAME=VALUE, got 'object1_mass='"):
-        physics_of(setup, None, "object1_mass")
+        physics_of(franka, None, "object1_mass")
 
 
 def test_an_episode_whose_code_raises_is_told_with_its_line(tmp_path, monkeypatch, capsys):
+    from cluster.errors import UserError
+    from cluster.rendering.episodes import episode_to_draw
+    from tests.own_robot import write_robot
+    from workers import setups
+
     monkeypatch.syspath_prepend(tmp_path)
     write_robot(tmp_path, "raising", ("force = command[0]", 'force = {}["puck"]'))
     with pytest.raises(
