@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
-from importlib.metadata import version
+from importlib.metadata import distributions, version
 from typing import Any
 
 from workers.plug_ins import file_name
@@ -191,7 +191,7 @@ def identity_of(
         episodes_per_shard=episodes_per_shard,
         schema_version=SCHEMA_VERSION,
         rollout_version=ROLLOUT_VERSION,
-        pybullet=version("pybullet"),
+        pybullet=version(_bullet()),
         numpy=version("numpy"),
         repeats=repeats,
         bad_kind="graded" if setup.task.graded else "bits",
@@ -200,3 +200,8 @@ def identity_of(
         setup_digest=setup.code,
         storage=storage,
     )
+
+
+def _bullet() -> str:
+    """The package that has the module: `pybullet`, or `pybullet-arm64` where that has no wheel."""
+    return "pybullet" if any(distributions(name="pybullet")) else "pybullet-arm64"
