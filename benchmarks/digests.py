@@ -1,4 +1,4 @@
-"""SHA-256 of some episodes: equal where (seed, index) gives equal bytes, whatever Python and PyBullet are there.
+"""SHA-256 of some episodes: equal where (seed, index) gives equal bytes, whatever Python and PyBullet there are.
 
 It needs NumPy, SciPy, jaxtyping and PyBullet alone.
 """
