@@ -44,12 +44,17 @@ def _section(name: str, source: Any) -> str:
     described = source[model.__name__]
     schema = model.model_json_schema()["properties"]
     rows = [
-        f"| `{name}.{key}` | {_kind(schema[key])} | {_default(schema[key]['default'])} "
+        f"| `{name}.{key}` | {_kind(schema[key])} | {_default(_value(model, key))} "
         f"| {_one_line(described[key].docstring.value)} |"
         for key in model.model_fields
     ]
     head = ["| setting | type | default | meaning |", "|---|---|---|---|"]
     return "\n".join([f"## {name}", "", described.docstring.value, "", *head, *rows])
+
+
+def _value(model: Any, key: str) -> Any:
+    """The default as JSON has it; one that is found out at run time is what it is here."""
+    return model().model_dump(mode="json")[key]
 
 
 def _kind(schema: Mapping[str, Any]) -> str:

@@ -162,7 +162,7 @@ def test_physics_that_nothing_applies_is_refused_but_for_the_start():
 
 
 def test_the_setup_of_the_documentation_runs_and_is_drawn():
-    page = (Path(__file__).parents[2] / "docs" / "gymnasium.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "gymnasium.md").read_text(encoding="utf-8")
     module = {}
     exec(page.split("```python\n")[1].split("```")[0], module)
     setup = module["setup"]()
