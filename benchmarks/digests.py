@@ -1,4 +1,4 @@
-"""SHA-256 of some episodes: equal where (seed, index) gives equal bytes, whatever Python and PyBullet there are.
+"""SHA-256 of some episodes: equal where seed and index give the same bytes, on any Python and PyBullet.
 
 It needs NumPy, SciPy, jaxtyping and PyBullet alone.
 """

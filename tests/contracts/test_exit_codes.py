@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cluster.errors import ExitCode, UsageError, UserError
 
-TABLE = Path(__file__).parents[2] / "docs" / "exit-codes.md"
+TABLE = Path(__file__).parents[2] / "docs" / "reference" / "exit-codes.md"
 ROW = re.compile(r"^\s*\| (\d+) +\| `([A-Z]+)`", re.MULTILINE)
 
 

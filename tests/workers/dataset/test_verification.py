@@ -156,7 +156,7 @@ def test_a_whole_dataset_with_stopped_episodes_has_no_problems(guarded):
         (
             10,
             {"bad": np.array([0] + [7] * 19, dtype=np.uint8), "y": 0.95},
-            "diverged episode has steps that are not",
+            "diverged or failed episode has steps that are not",
         ),
         (11, {"bad": np.array([4, 1] + [4] * 18, dtype=np.uint8), "y": 1.0}, "goes on after it was stopped"),
     ],
