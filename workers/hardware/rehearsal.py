@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from workers.attempts import Attempts
 from workers.controllers.controller import unit_cube
 from workers.hardware import ledger
 from workers.hardware.driver import Measurement, Motion, RobotFault
 from workers.hardware.ledger import MotionLedger
 from workers.randomness import Stream, generator
-from workers.rollout import rollout
 from workers.setups import Setup
 
 GAP = "wide"
@@ -58,15 +58,17 @@ class RehearsalRobot:
             What the episode was worth, and how long it took with the pace.
 
         Raises:
-            RobotFault: it was stopped, before the trial or during it.
+            RobotFault: it was stopped, before the trial or during it, or the simulation's code raised.
         """
         began = time.monotonic()
         if self._stopped.is_set():
             raise RobotFault(f"trial {trial_id} was not started: the robot has been stopped")
         controller = unit_cube(x.astype(np.float32), self._simulated.dimensions)
         self._ledger.start(trial_id, x)
-        with self._simulated.open() as simulation:
-            episode = rollout(self._simulated, simulation, controller, self._physics)
+        with Attempts(self._simulated) as attempts:
+            episode = attempts.rollout(controller, self._physics)
+        if episode.failure is not None:
+            raise RobotFault(f"trial {trial_id} failed: {episode.failure.reason}")
         if self._stopped.wait(max(0.0, self._pace - (time.monotonic() - began))):
             raise RobotFault(f"trial {trial_id} was stopped before its end")
         evidence = hashlib.sha256(episode.xi.tobytes()).hexdigest()

@@ -6,6 +6,7 @@ import threading
 import numpy as np
 import pytest
 
+from tests.own_robot import write_robot
 from workers import setups
 from workers.hardware.driver import RobotFault
 from workers.hardware.rehearsal import RehearsalRobot
@@ -60,3 +61,13 @@ def test_a_stop_in_motion_is_a_fault_without_measurement(franka, x, tmp_path):
     stop.join()
     assert robot.motion("a").started
     assert robot.motion("a").measurement is None
+
+
+def test_code_that_raises_is_a_fault_that_names_its_line(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    write_robot(tmp_path, "faulty", ("force = command[0]", 'force = {}["puck"]'))
+    robot = RehearsalRobot("rehearsal:faulty", setups.load("faulty"), 0, 0.0, tmp_path)
+    with pytest.raises(RobotFault, match=r"trial first failed: KeyError: 'puck', at .*faulty.py:\d+"):
+        robot.run("first", np.full(4, 0.5))
+    assert robot.motion("first").started
+    assert robot.motion("first").measurement is None
