@@ -4,7 +4,6 @@ Each function does what the command of its name does, with the same settings and
 model or comparison may be begun by one and continued by the other.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -232,7 +231,5 @@ def _setup(setup: Setup | str) -> Setup:
 
 
 def _settings(changes: Mapping[str, Any]) -> Settings:
-    """The settings of the working directory's file, changed."""
-    return load_settings(
-        None, [f"{name}={json.dumps(value, default=str)}" for name, value in changes.items()]
-    )
+    """The settings of the working directory's file, changed; values are written as `--set` takes them."""
+    return load_settings(None, [f"{name}={value}" for name, value in changes.items()])

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float32
 
 from workers.environments.environment import Observed
 from workers.tasks.task import Bad, Task
+from workers.user_code import UserCodeError, describe
 
 Function = Callable[[Observed], Any]
 _Marked = TypeVar("_Marked", bound=Function)
@@ -27,7 +28,7 @@ _MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError,
 def conditions(*names: str) -> Callable[[_Marked], _Marked]:
     """Marks a function that returns one row of booleans per condition; 1 to 7 names, in the rows' order."""
     if not 1 <= len(names) <= 7:
-        raise ValueError(f"a function has 1 to 7 conditions, got {len(names)}: {names}")
+        raise UserCodeError(f"a function has 1 to 7 conditions, got {len(names)}: {names}")
 
     def mark(function: _Marked) -> _Marked:
         setattr(function, _NAMES, names)
@@ -66,13 +67,13 @@ class OwnBad(Task):
         """The function's own values, checked.
 
         Raises:
-            ValueError: the function fails, or its values have another type, shape or range than they must.
+            UserCodeError: the function fails, or its values have another type, shape or range than they must.
         """
         try:
             values = np.asarray(self.function(_read_only(observed)))
         except _MISTAKES as error:
-            raise ValueError(
-                f"{self.bad_name} failed with {type(error).__name__}: {error}. It gets xi "
+            raise UserCodeError(
+                f"{self.bad_name} failed with {describe(error)}. It gets xi "
                 f"{observed.xi.shape} and the signals {', '.join(observed.signals) or '(none)'}"
             ) from error
         steps = observed.xi.shape[1]
@@ -104,14 +105,14 @@ class OwnBad(Task):
 
     def _degrees(self, values: np.ndarray, steps: int) -> Float32[np.ndarray, "1 time"]:
         if values.dtype.kind not in "bfiu" or values.shape != (steps,):
-            raise ValueError(
+            raise UserCodeError(
                 f"{self.bad_name} must return one number per step, shape ({steps},), got {values.dtype} of "
                 f"shape {values.shape}; reduce the other axes, or mark it with "
                 "workers.tasks.own_bad.conditions to return one row of booleans per condition"
             )
         outside = np.flatnonzero(~((values >= 0) & (values <= 1)))
         if outside.size:
-            raise ValueError(
+            raise UserCodeError(
                 f"{self.bad_name} must return numbers in [0, 1], got {values[outside[0]]} in step "
                 f"{outside[0]}; scale them, or clip them with np.clip(values, 0, 1)"
             )
@@ -120,7 +121,7 @@ class OwnBad(Task):
     def _rows(self, values: np.ndarray, steps: int) -> Bool[np.ndarray, "conditions time"]:
         expected = (len(self.conditions), steps)
         if values.dtype != np.bool_ or values.shape != expected:
-            raise ValueError(
+            raise UserCodeError(
                 f"{self.bad_name} is marked with {len(self.conditions)} conditions and must return bool of "
                 f"shape {expected}, got {values.dtype} of shape {values.shape}; stack one comparison per "
                 "condition, or unmark it to return one degree in [0, 1] per step"

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 
 from workers.environments.environment import Observed
+from workers.user_code import UserCodeError
 
 Bad = Bool[np.ndarray, "conditions time"] | Float32[np.ndarray, "1 time"]
 """G_bad says of every step which conditions hold, or, if it is graded, the degree in [0, 1]."""
@@ -73,12 +74,12 @@ def check_bad(task: Task, bad: Any, steps: int) -> Bad:
         Booleans, [conditions, steps], or float32 degrees, [1, steps].
 
     Raises:
-        ValueError: it has another type or shape than it must, or degrees outside [0, 1].
+        UserCodeError: it has another type or shape than it must, or degrees outside [0, 1].
     """
     rows, expected = np.asarray(bad), (len(task.conditions), steps)
     kind, kinds = ("float32", "f") if task.graded else ("bool", "bui")
     if rows.dtype.kind not in kinds or rows.shape != expected:
-        raise ValueError(
+        raise UserCodeError(
             f"{type(task).__name__}.is_bad must return {kind} of shape {expected}, one row for each of "
             f"{', '.join(task.conditions)} and one column per step, got {rows.dtype} of shape {rows.shape}; "
             "make its rows and `conditions` agree"
@@ -87,7 +88,7 @@ def check_bad(task: Task, bad: Any, steps: int) -> Bad:
         return rows.astype(np.bool_, copy=False)
     outside = np.flatnonzero(~((rows[0] >= 0) & (rows[0] <= 1)))
     if outside.size:
-        raise ValueError(
+        raise UserCodeError(
             f"{type(task).__name__}.is_bad must return degrees in [0, 1], got {rows[0, outside[0]]} in step "
             f"{outside[0]}; scale them, or clip them with np.clip(values, 0, 1)"
         )
@@ -102,10 +103,10 @@ def require_objective(task: Task, f: float) -> None:
         f: the objective.
 
     Raises:
-        ValueError: it is not a finite number.
+        UserCodeError: it is not a finite number.
     """
     if not math.isfinite(f):
-        raise ValueError(
+        raise UserCodeError(
             f"the objective of {type(task).__name__} must be a finite number, got {f}; return one "
             "for every episode, the lower limit of f for one that is worth nothing"
         )

@@ -56,17 +56,17 @@ def test_a_pilot_is_the_beginning_of_the_dataset_and_is_judged_at_its_end(
     ray_session, tracking_settings, tmp_path, capsys
 ):
     folder, tracker = tmp_path / "dataset", open_tracker(tracking_settings)
-    collect_pilot(*job(folder, 12, ray_session, tracker))
+    collect_pilot(*job(folder, 80, ray_session, tracker))
     said = capsys.readouterr().err
-    assert "the whole job of 12 episodes on 2 actors, from its first 8" in said
+    assert "the whole job of 80 episodes on 2 actors, from its first 8" in said
     assert all(f"  {name} " in said for name in ("core-hours", "wall time", "disk", "badness"))
     pilot = {path: path.stat().st_ino for path in folder.glob("*.parquet")}
     assert len(pilot) == 4
-    dataset = collect(*job(folder, 12, ray_session, tracker))
-    assert dataset.episodes() == 12
+    dataset = collect(*job(folder, 80, ray_session, tracker))
+    assert dataset.episodes() == 80
     assert all(path.stat().st_ino == number for path, number in pilot.items())
     said = capsys.readouterr().err
-    assert "against the plan, 12 of 12 episodes accounted for: core_hours " in said
+    assert "against the plan, 80 of 80 episodes accounted for: core_hours " in said
     plan = json.loads((folder / PLAN).read_text())
     assert plan["off"].keys() == {"core_hours", "hours", "bytes", "badness"}
     assert sum(entry["size"] for entry in plan["spent"]) == dataset.size()

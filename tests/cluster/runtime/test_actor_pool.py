@@ -215,7 +215,7 @@ def test_losing_a_worker_in_any_way_that_ray_knows_is_a_failed_attempt(tmp_path)
     crash = ray.remote(die).options(max_retries=0, num_cpus=0)
     crashes = [crash]
 
-    def submit(worker, item):
+    def submit(worker, item, deaths):  # noqa: ARG001
         return crashes.pop().remote() if crashes else worker.run.remote(item)
 
     actor = ray.remote(Worker).options(num_cpus=1)
