@@ -77,6 +77,7 @@ def test_a_collection_loses_the_episodes_that_failed_and_no_other(folder, monkey
     assert "it took longer than 3 s" in accounts
 
 
+@pytest.mark.slow
 def test_a_comparison_reports_of_what_there_is_and_names_the_failed_trials(folder):
     grid = ("--methods", "random", "--runs", "2", "--trials", "8")
     done = svaedc(
