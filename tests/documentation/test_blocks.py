@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from tests.documentation.console import Done
+from tests.documentation.console import Done, is_printed
 from tests.documentation.pages import PAGES, Fence, Step, fences, name
 
 SHOWN = ("text", "json", "toml", "yaml", "bibtex")
@@ -79,3 +79,17 @@ def test_few_blocks_are_not_run():
 )
 def test_a_page_is_held_against_what_is_printed(expected, printed, status, agrees):
     assert (Done(Step(1, "svaedc", expected), printed, status).complaint() == "") is agrees
+
+
+@pytest.mark.parametrize(
+    ("expected", "printed", "is_equal"),
+    [
+        ("…\n…data holds 512 episodes, 11.… MB", "256/512\n/tmp/data holds 512 episodes, 11.8 MB\n", True),
+        ("…\nfranka: badness 0.2… (tipped)", "franka:  badness 0.20\n(tipped)", True),
+        ("data is whole: … shards", "data is whole: 512 episodes in 19 shards", True),
+        ("data is whole: 16 shards", "data is whole: 19 shards", False),
+        ("data is whole", "data is whole: 19 shards", False),
+    ],
+)
+def test_a_page_leaves_out_what_differs_and_nothing_else(expected, printed, is_equal):
+    assert is_printed(expected, printed) is is_equal
