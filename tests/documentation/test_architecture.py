@@ -8,6 +8,7 @@ import pytest
 from tests.documentation.pages import ROOT
 
 PACKAGES = ("workers", "svaedc", "cluster")
+TABLE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 PICTURE = (ROOT / "README.md").read_text(encoding="utf-8").partition("## How it is built")[2]
 
 
@@ -39,3 +40,13 @@ def test_the_picture_has_every_folder_and_their_order(package):
     drawn = [[lines[room] for room in layer if room in lines] for layer in order]
     places = [place for layer in drawn for place in sorted(layer)]
     assert places == sorted(places)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_table_for_contributors_has_every_room_in_its_layer(package):
+    """A remark in brackets names folders within a room; `__main__` is no room."""
+    cell = re.search(rf"^\| `{package}/` \| ([^|]+) \|", TABLE, re.MULTILINE)
+    assert cell
+    told = [set(re.findall(r"`(\w+)`", layer)) for layer in re.sub(r"\(.*?\)", "", cell[1]).split(" · ")]
+    named = [{room.strip() for room in layer.split("|")} for layer in layers(package)]
+    assert told == [layer for layer in named if layer != {"__main__"}]
