@@ -10,6 +10,7 @@ from cluster.errors import UserError
 from cluster.progress import say
 from cluster.rendering.episodes import first_physics
 from cluster.rendering.render import Drawing, render
+from svaedc.analysis.words import quantity
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample, sample
 from workers.conformance.suite import CHECKS, Check, find
@@ -38,7 +39,7 @@ def check(setup: Setup, seed: int, timeout: float, picture: Path | None) -> None
     if picture is not None:
         _draw(setup, seed, picture)
     mistakes, doubts = found[Severity.MISTAKE], found[Severity.DOUBT]
-    counts = f"{_number_of(mistakes, 'mistake')}, {_number_of(doubts, 'doubt')}"
+    counts = f"{quantity(mistakes, 'mistake')}, {quantity(doubts, 'doubt')}"
     if mistakes:
         raise UserError(f"{setup.name} has {counts}; mend the mistakes before you collect")
     say(f"{setup.name} can be collected: {counts}")
@@ -84,7 +85,3 @@ def _draw(setup: Setup, seed: int, picture: Path) -> None:
         )
     except UserError as error:
         say(f"  {'no':8} {'picture':12} {error}")
-
-
-def _number_of(count: int, what: str) -> str:
-    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"

@@ -3,7 +3,6 @@
 import errno
 import fcntl
 import json
-import math
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cluster.errors import UserError
+from svaedc.analysis.strict_json import json_values
 from workers.dataset.storage.atomic import synchronise
 
 DISK_ERRORS = frozenset(
@@ -143,15 +143,6 @@ def json_text(content: Any, indent: int | None = 2) -> str:
         Text without a line end.
     """
     return json.dumps(json_values(content), indent=indent, allow_nan=False)
-
-
-def json_values(content: Any) -> Any:
-    """The same values, null where JSON has no word for a number."""
-    if isinstance(content, dict):
-        return {name: json_values(value) for name, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [json_values(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

@@ -4,6 +4,7 @@ import faulthandler
 import math
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from contextlib import suppress
 from types import TracebackType
@@ -29,25 +30,21 @@ Case = tuple[np.ndarray, Physics]
 """It is rolled out: a controller, [D] in [0, 1], and a value for every physics parameter by name."""
 
 
-class Attempts:
-    """Rolls out in this process; an episode that raises is tried once more in an environment opened anew.
+class SafeRollouts(ABC):
+    """Rolls out controllers of one setup; whatever their code does, each gives an episode.
 
-    An episode that takes too long ends this process, for code that hangs cannot be broken off from within:
-    its traceback goes to `words`, and `workers.isolation` finds out which episode it was.
+    One that fails is tried once more where no episode was before it: what an earlier one left behind is not
+    its fault.
 
     Args:
         setup: whose controllers are rolled out.
-        timeout: longest duration of an episode, in s.
-        words: open file for the traceback of one that hangs.
 
     Attributes:
         setup: whose controllers are rolled out.
     """
 
-    def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS, words: Any = sys.__stderr__) -> None:
+    def __init__(self, setup: Setup) -> None:
         self.setup = setup
-        self._watchdog = _Watchdog(timeout, words)
-        self._environment: Environment | None = None
 
     def rollout(self, x: np.ndarray, physics: Physics) -> Episode:
         """Roll out one controller.
@@ -68,40 +65,35 @@ class Attempts:
             cases: controllers and their physics.
 
         Returns:
-            An episode for each; those whose code raised in a fresh environment too have failed, and say why.
+            An episode for each; those that failed say of what.
 
         Raises:
             ValueError: x is no controller of the setup.
             OSError: the machine is in trouble; so does MemoryError.
         """
-        with self._watchdog:
-            return [self._attempt(unit_cube(x, self.setup.dimensions), physics) for x, physics in cases]
+        return [self._attempt(unit_cube(x, self.setup.dimensions), physics) for x, physics in cases]
 
     def _attempt(self, x: np.ndarray, physics: Physics) -> Episode:
-        was_fresh = self._environment is None
-        try:
-            return self._roll_out(x, physics)
-        except _MACHINE_ERRORS:
-            raise
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - users' code may raise anything
-            self.close()
-            failure = Failure(describe(error), full_traceback(error))
-        # What an episode before left behind is not this one's fault.
-        return failed_episode(self.setup, x, physics, failure) if was_fresh else self._attempt(x, physics)
+        was_fresh = self._is_fresh
+        made = self._try(x, physics)
+        if isinstance(made, Episode):
+            return made
+        return failed_episode(self.setup, x, physics, made) if was_fresh else self._attempt(x, physics)
 
-    def _roll_out(self, x: np.ndarray, physics: Physics) -> Episode:
-        self._watchdog.watch()
-        if self._environment is None:
-            self._environment = self.setup.open()
-        return rollout(self.setup, self._environment, x, physics)
+    @property
+    @abstractmethod
+    def _is_fresh(self) -> bool:
+        """Whether nothing was rolled out since the environment was opened; so it is after a failure."""
 
+    @abstractmethod
+    def _try(self, x: np.ndarray, physics: Physics) -> Episode | Failure:
+        """The episode, or why there is none."""
+
+    @abstractmethod
     def close(self) -> None:
         """End the simulation, if there is one."""
-        environment, self._environment = self._environment, None
-        if environment is not None:
-            _close(environment)
 
-    def __enter__(self) -> "Attempts":
+    def __enter__(self) -> "SafeRollouts":
         return self
 
     def __exit__(
@@ -110,19 +102,65 @@ class Attempts:
         self.close()
 
 
-def _close(environment: Environment) -> None:
-    with suppress(Exception):  # it has been given up already
-        environment.close()
+class Attempts(SafeRollouts):
+    """Rolls out in this process, in an environment that is opened anew after something raised in it.
+
+    An episode that takes too long ends this process, for code that hangs cannot be broken off from within:
+    its traceback goes to `words`, and `workers.isolation` finds out which episode it was.
+
+    Args:
+        setup: whose controllers are rolled out.
+        timeout: longest duration of an episode, in s.
+        words: open file for the traceback of one that hangs.
+    """
+
+    def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS, words: Any = sys.__stderr__) -> None:
+        super().__init__(setup)
+        self._watchdog = Watchdog(timeout, words)
+        self._environment: Environment | None = None
+
+    def rollouts(self, cases: Iterable[Case]) -> list[Episode]:
+        """Roll out controllers, one after the other; see `SafeRollouts.rollouts`."""
+        with self._watchdog:
+            return super().rollouts(cases)
+
+    @property
+    def _is_fresh(self) -> bool:
+        return self._environment is None
+
+    def _try(self, x: np.ndarray, physics: Physics) -> Episode | Failure:
+        self._watchdog.watch()
+        try:
+            if self._environment is None:
+                self._environment = self.setup.open()
+            return rollout(self.setup, self._environment, x, physics)
+        except _MACHINE_ERRORS:
+            raise
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - users' code may raise anything
+            self.close()
+            return Failure(describe(error), full_traceback(error))
+
+    def close(self) -> None:
+        """End the simulation, if there is one."""
+        environment, self._environment = self._environment, None
+        if environment is not None:
+            with suppress(Exception):  # it has been given up already
+                environment.close()
 
 
-class _Watchdog:
+class Watchdog:
     """Ends the process, with a traceback of its threads, when no episode has begun for too long.
 
     The standard library does it in C and needs no lock of Python's: code that hangs in C is ended too. It
-    takes a millisecond to set, so that it is set anew only after a tenth of its time.
+    takes a millisecond to set, so that it is set anew only after a tenth of its time. It watches from the
+    first `watch` in a `with` block to the end of that.
+
+    Args:
+        seconds: longest duration of an episode.
+        words: open file for the traceback.
     """
 
-    def __init__(self, seconds: float, words: Any) -> None:
+    def __init__(self, seconds: float = TIMEOUT_SECONDS, words: Any = sys.__stderr__) -> None:
         self._seconds = seconds
         self._words = words
         self._set = -math.inf
@@ -134,8 +172,9 @@ class _Watchdog:
             self._set = now
             faulthandler.dump_traceback_later(self._seconds * 1.1, exit=True, file=self._words)
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> "Watchdog":
         """Episodes follow."""
+        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -3,26 +3,23 @@
 import faulthandler
 import os
 import threading
-from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
-from workers.attempts import TIMEOUT_SECONDS, Attempts, Case
-from workers.controllers.controller import unit_cube
+from workers.attempts import TIMEOUT_SECONDS, Attempts, SafeRollouts
 from workers.physics import Physics
-from workers.rollout import Episode, Failure, failed_episode
+from workers.rollout import Episode, Failure
 from workers.setups import Setup, load
 from workers.setups.user_bad import with_bad
 
 
-class IsolatedAttempts:
+class IsolatedAttempts(SafeRollouts):
     """Rolls out in a child process: an episode that hangs or ends its process fails, the next gets a new one.
 
     Args:
@@ -31,49 +28,21 @@ class IsolatedAttempts:
     """
 
     def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS) -> None:
-        self._setup = setup
+        super().__init__(setup)
         self._timeout = timeout
         self._folder = TemporaryDirectory(prefix="svaedc-")
         self._child: ProcessPoolExecutor | None = None
 
-    def rollout(self, x: np.ndarray, physics: Physics) -> Episode:
-        """Roll out one controller.
+    @property
+    def _is_fresh(self) -> bool:
+        return self._child is None
 
-        Args:
-            x: the controller, [D], in [0, 1].
-            physics: a value for every parameter of the setup, by name.
-
-        Returns:
-            The episode, as `rollouts` gives it.
-        """
-        return self.rollouts([(x, physics)])[0]
-
-    def rollouts(self, cases: Iterable[Case]) -> list[Episode]:
-        """Roll out controllers, one after the other.
-
-        Args:
-            cases: controllers and their physics.
-
-        Returns:
-            An episode for each; those that raised, hung or ended their process have failed, and say why.
-
-        Raises:
-            ValueError: x is no controller of the setup.
-            OSError: the machine is in trouble; so does MemoryError.
-        """
-        return [self._attempt(unit_cube(x, self._setup.dimensions), physics) for x, physics in cases]
-
-    def _attempt(self, x: np.ndarray, physics: Physics) -> Episode:
-        was_fresh = self._child is None
+    def _try(self, x: np.ndarray, physics: Physics) -> Episode | Failure:
         try:
             return self._executor().submit(_roll_out, x, dict(physics)).result()
         except BrokenProcessPool:
             self._child = None
-        return (
-            failed_episode(self._setup, x, physics, self._failure())
-            if was_fresh
-            else self._attempt(x, physics)
-        )
+            return self._failure()
 
     def _executor(self) -> ProcessPoolExecutor:
         if self._child is None:
@@ -82,7 +51,7 @@ class IsolatedAttempts:
                 max_workers=1,
                 mp_context=get_context("spawn"),
                 initializer=_begin,
-                initargs=(self._setup.name, self._setup.task.bad_name, self._timeout, self._last),
+                initargs=(self.setup.name, self.setup.task.bad_name, self._timeout, self._last),
             )
         return self._child
 
@@ -105,14 +74,6 @@ class IsolatedAttempts:
             self._child.shutdown()
         self._child = None
         self._folder.cleanup()
-
-    def __enter__(self) -> "IsolatedAttempts":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 _attempts: Attempts

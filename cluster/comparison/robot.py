@@ -11,7 +11,7 @@ from cluster.comparison.records import RunKey
 from cluster.failures import failure_text
 from cluster.optimization.factory import outcome_of
 from svaedc.bo.loop import Outcome
-from workers.attempts import Attempts
+from workers.attempts import Attempts, SafeRollouts
 from workers.isolation import IsolatedAttempts
 from workers.physics import Physics
 from workers.setups import Setup
@@ -34,7 +34,7 @@ class HiddenRobot:
     key: RunKey
     setup: Setup
     physics: Physics
-    attempts: Attempts | IsolatedAttempts
+    attempts: SafeRollouts
     next: int
 
     def evaluate(self, x: np.ndarray) -> Outcome:
@@ -63,7 +63,7 @@ class HiddenRobot:
 @contextmanager
 def safe_attempts(
     folder: ComparisonFolder, key: RunKey, trials: int, attempts: Attempts, timeout: float
-) -> Iterator[Attempts | IsolatedAttempts]:
+) -> Iterator[SafeRollouts]:
     """Chooses what rolls out the rest of a run.
 
     A process that ended in the middle of a trial has left its note. Whatever ended it, the rest of the run is

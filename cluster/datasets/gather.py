@@ -155,7 +155,7 @@ def note_report(report: ShardReport, dataset: Dataset, counts: CollectionProgres
         except OSError as error:
             raise _unwritable(dataset, error) from error
         if not told:
-            say(f"episode {failed.index} failed alone, all about it is in {path}: {failed.reason}")
+            say(f"episode {failed.index} failed alone, all about it is in {path}: {failed.failure.reason}")
         told += 1
 
 

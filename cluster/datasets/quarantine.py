@@ -9,7 +9,6 @@ from workers.collection.shard import FailedEpisode
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard, shard_named
 from workers.dataset.storage.location import Location, files
-from workers.rollout import Failure
 
 FOLDER = "quarantine"
 
@@ -49,11 +48,8 @@ def keep_account(dataset: Dataset, failed: FailedEpisode) -> Location:
     path.parent.mkdir(exist_ok=True)
     identity = dataset.identity
     what = f"episode {failed.index} of seed {identity.seed}"
-    failure = Failure(failed.reason, failed.text)
-    path.write_text(
-        failure_text(what, identity.setup, identity.bad_name, failed.x, failed.physics, failure),
-        encoding="utf-8",
-    )
+    text = failure_text(what, identity.setup, identity.bad_name, failed.x, failed.physics, failed.failure)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

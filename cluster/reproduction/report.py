@@ -11,6 +11,7 @@ from cluster.files import write_json, write_text, writing
 from cluster.reproduction.plan import Reproduction
 from cluster.reproduction.recipe import Recipe
 from svaedc.analysis.evidence import Claim, Finding
+from svaedc.analysis.strict_json import json_values
 from svaedc.analysis.summary import Summary
 
 _HEADER = ("the paper", "where", "measured here", "value, 90 % interval", "runs", "verdict")
@@ -68,7 +69,7 @@ class Table:
                     "claim": entry.claim.text,
                     "source": entry.claim.source,
                     "measure": entry.measure,
-                    **{name: _plain(number) for name, number in asdict(entry.finding.value).items()},
+                    **json_values(asdict(entry.finding.value)),
                     "runs": entry.finding.runs,
                     "verdict": entry.finding.verdict,
                 }
@@ -144,7 +145,3 @@ def _settings(reproduction: Reproduction) -> dict[str, Any]:
         "models": ", ".join(str(path) for path in reproduction.models.values()),
         "runs": reproduction.runs,
     }
-
-
-def _plain(number: float) -> float | None:
-    return None if math.isnan(number) else number

@@ -22,8 +22,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from cluster.config import SQLITE, TrackingSettings
 from cluster.errors import UserError
-from cluster.files import json_values
 from cluster.tracking.origin import origin
+from svaedc.analysis.strict_json import json_values
 from workers.dataset.storage.location import Location
 
 UI_PORT = 5000

@@ -7,6 +7,7 @@ from typing import Any
 
 from svaedc.analysis.seeds import Purpose
 from svaedc.analysis.statistics import Estimate
+from svaedc.analysis.strict_json import json_values
 
 
 @dataclass(frozen=True)
@@ -147,13 +148,5 @@ class Summary:
 
     def as_json(self) -> dict[str, Any]:
         """Plain dictionaries, lists, and numbers; what is not finite, which JSON lacks, becomes None."""
-        plain: dict[str, Any] = _plain(asdict(self))
+        plain: dict[str, Any] = json_values(asdict(self))
         return plain
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -120,3 +120,31 @@ def test_a_sound_episode_is_what_the_control_loop_gives(own_robot):
                 attempts.rollout(x, physics).xi.tobytes()
                 == rollout(setup, environment, x, physics).xi.tobytes()
             )
+
+
+def test_a_try_out_that_hangs_ends_its_process_and_shows_where(own_robot, tmp_path):
+    own_robot(
+        ("force = command[0]", "force = self.wait()"),
+        (
+            "    def record(self):",
+            "    def wait(self):\n        import time\n        time.sleep(100)\n\n    def record(self):",
+        ),
+        name="stuck_glider",
+    )
+    code = (
+        "from workers import attempts, setups\nfrom workers.collection import shard\n"
+        "shard.Watchdog = lambda: attempts.Watchdog(0.5)\n"
+        "shard.require_working(setups.load('stuck_glider'), 0)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={"PYTHONPATH": ":".join(sys.path)},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=60,
+    )
+    assert ended.returncode == 1
+    assert "Timeout" in ended.stderr
+    assert "stuck_glider.py" in ended.stderr

@@ -19,7 +19,6 @@ from workers.dataset.shards import Shard, sha256
 from workers.dataset.storage.location import Location, fetch
 from workers.dataset.verification import Defect, file_problems
 from workers.isolation import IsolatedAttempts
-from workers.rollout import Episode
 from workers.setups import Setup
 
 
@@ -57,12 +56,13 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
     """
     with TemporaryDirectory() as folder:
         again = Path(folder) / shard.name
-        episodes = _roll_out(setup, dataset, shard)
+        attempts = _attempts_for(setup)
+        episodes = roll_out(setup, dataset, shard, attempts)
         schema.write(again, dataset.identity, shard.start, episodes)
         kept = fetch(dataset.path(shard))
         problems = [] if sha256(again) == sha256(kept) else [_told_difference(kept, again, dataset)]
     seed, repeats = dataset.identity.seed, dataset.identity.repeats
-    problems.append(order_dependence(setup, seed, repeats, shard.start, episodes))
+    problems.append(order_dependence(setup, seed, repeats, shard.start, episodes, attempts))
     return [Defect(shard.name, problem) for problem in problems if problem]
 
 
@@ -99,12 +99,13 @@ def repair(setup: Setup, dataset: Dataset, shard: Shard) -> Repair:
 
 
 def _write(setup: Setup, dataset: Dataset, shard: Shard, path: Path) -> None:
-    schema.write(path, dataset.identity, shard.start, _roll_out(setup, dataset, shard))
+    episodes = roll_out(setup, dataset, shard, _attempts_for(setup))
+    schema.write(path, dataset.identity, shard.start, episodes)
 
 
-def _roll_out(setup: Setup, dataset: Dataset, shard: Shard) -> list[Episode]:
+def _attempts_for(setup: Setup) -> type[Attempts | IsolatedAttempts]:
     """Users' code may hang or end its process, and this process does other things besides."""
-    return roll_out(setup, dataset, shard, IsolatedAttempts if is_of_users(setup) else Attempts)
+    return IsolatedAttempts if is_of_users(setup) else Attempts
 
 
 def _difference(kept: Columns, again: Columns) -> str:

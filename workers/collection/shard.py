@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workers.attempts import Attempts
+from workers.attempts import Attempts, SafeRollouts, Watchdog
 from workers.collection.independence import order_dependence
 from workers.dataset import schema, shards
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.storage.temporary import host
-from workers.isolation import IsolatedAttempts
 from workers.physics import Physics
-from workers.rollout import DIVERGED, FAILED, UNUSABLE, Episode, draw, rollout, storable
+from workers.rollout import DIVERGED, FAILED, UNUSABLE, Episode, Failure, draw, rollout, storable
 from workers.setups import SETUPS, Setup
 from workers.tasks.task import require_objective
 from workers.user_code import UserCodeError, describe
@@ -32,15 +31,13 @@ class FailedEpisode:
         index: of the episode.
         x: the controller, D numbers in [0, 1].
         physics: that it ran under.
-        reason: in one line; type, message, file and line where they are known.
-        text: all that is known, a traceback as a rule.
+        failure: what it failed of.
     """
 
     index: int
     x: tuple[float, ...]
     physics: Physics
-    reason: str
-    text: str
+    failure: Failure
 
 
 @dataclass(frozen=True)
@@ -86,6 +83,8 @@ RollOut = Callable[[Setup, Dataset, Shard], list[Episode]]
 def require_working(setup: Setup, seed: int) -> None:
     """Roll out one episode if users supplied the robot or G_bad: their mistakes are no fault of a shard.
 
+    An episode that hangs ends this process, with a traceback that shows where.
+
     Args:
         setup: what is tried.
         seed: of the dataset; its episode 0 is the one rolled out.
@@ -98,7 +97,8 @@ def require_working(setup: Setup, seed: int) -> None:
     if not is_of_users(setup):
         return
     try:
-        with setup.open() as environment:
+        with Watchdog() as watchdog, setup.open() as environment:
+            watchdog.watch()
             episode = rollout(setup, environment, *draw(setup, seed, 0))
         require_objective(setup.task, episode.f)
     except (UserCodeError, OSError):
@@ -118,7 +118,7 @@ def roll_out(
     setup: Setup,
     dataset: Dataset,
     shard: Shard,
-    attempts: Callable[[Setup], Attempts | IsolatedAttempts] = Attempts,
+    attempts: Callable[[Setup], SafeRollouts] = Attempts,
 ) -> list[Episode]:
     """Roll out the episodes of a shard, in a fresh simulation.
 
@@ -181,10 +181,7 @@ def collect_shard(setup: Setup, dataset: Dataset, shard: Shard, roll_out: RollOu
 def _failures(shard: Shard, episodes: list[Episode]) -> Iterator[FailedEpisode]:
     for index, episode in enumerate(episodes, start=shard.start):
         if episode.failure is not None:
-            failure = episode.failure
-            yield FailedEpisode(
-                index, tuple(episode.x.tolist()), episode.physics, failure.reason, failure.text
-            )
+            yield FailedEpisode(index, tuple(episode.x.tolist()), episode.physics, episode.failure)
 
 
 def _leak(setup: Setup, dataset: Dataset, shard: Shard, episodes: list[Episode]) -> str:

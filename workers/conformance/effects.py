@@ -2,20 +2,19 @@
 
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from contextlib import closing
 from typing import Any
 
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 
-from workers.attempts import Attempts
+from workers.collection.independence import difference
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample
 from workers.environments.environment import Channel
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import Stream, generator
-from workers.rollout import Episode, draw, rollout
-from workers.user_code import describe
+from workers.rollout import UNUSABLE, Episode, draw, rollout
 
 SECONDS = 10.0
 """Each of these checks takes about so long."""
@@ -28,12 +27,11 @@ CONTROLLERS = 2
 def check_commands(sample: Sample) -> Iterator[Remark]:
     """Environment and setup agree, and commands are what the environment's action channels say."""
     with sample.setup.open() as environment:
-        for name, stated in (
-            ("observation", tuple(sample.setup.observation)),
-            ("control_step", sample.setup.control_step),
+        for name, own in (
+            ("observation", tuple(environment.observation)),
+            ("control_step", environment.control_step),
         ):
-            own = getattr(environment, name, None)
-            own = tuple(own) if name == "observation" and own is not None else own
+            stated = getattr(sample.setup, name)
             if own != stated:
                 text = (
                     f"{name} of the environment is {own}, that of the setup {stated}; state one of them twice"
@@ -75,16 +73,15 @@ def check_physics(sample: Sample) -> Iterator[Remark]:
     middle = sample.setup.physics.middle()
     affordable = max(1, sample.affordable(SECONDS) // 2)
     xs = [episode.x for episode in sample.usable.values()][:affordable]
-    with Attempts(sample.setup) as attempts:
-        for name, (low, high) in sample.setup.physics.intervals.items():
-            pairs = (attempts.rollouts([(x, {**middle, name: low}), (x, {**middle, name: high})]) for x in xs)
-            if low < high and all(_is_same(*pair) for pair in pairs):
-                yield Remark(
-                    "physics",
-                    Severity.MISTAKE if len(xs) >= ENOUGH else Severity.DOUBT,
-                    f"{name} changes nothing in {len(xs)} controllers: its two ends {low:g} and {high:g} "
-                    f"give the same trajectories; use physics[{name!r}] in reset(), or leave it out",
-                )
+    for name, (low, high) in sample.setup.physics.intervals.items():
+        pairs = ([(x, {**middle, name: value}) for value in (low, high)] for x in xs)
+        if low < high and all(_are_alike(sample.attempts.rollouts(pair)) for pair in pairs):
+            yield Remark(
+                "physics",
+                Severity.MISTAKE if len(xs) >= ENOUGH else Severity.DOUBT,
+                f"{name} changes nothing in {len(xs)} controllers: its two ends {low:g} and {high:g} give "
+                f"the same trajectories; use physics[{name!r}] in reset(), or leave it out",
+            )
 
 
 def check_parameters(sample: Sample) -> Iterator[Remark]:
@@ -94,16 +91,11 @@ def check_parameters(sample: Sample) -> Iterator[Remark]:
     affordable = max(1, sample.affordable(SECONDS) // (2 * max(len(bases), 1)))
     order = generator(sample.seed, Stream.CONTROLLER, 0).permutation(len(names))[:affordable]
     physics = sample.setup.physics.middle()
-    with Attempts(sample.setup) as attempts:
-        for place in sorted(order.tolist()):
-            pairs = [
-                attempts.rollouts([(_with(x, place, value), physics) for value in (0.1, 0.9)]) for x in bases
-            ]
-            if pairs and all(_is_same(*pair) for pair in pairs):
-                text = (
-                    f"parameter {names[place]} of the controller changes nothing in {len(bases)} controllers"
-                )
-                yield Remark("parameters", Severity.DOUBT, f"{text}; use it in start(), or leave it out")
+    for place in sorted(order.tolist()):
+        pairs = ([(_with(x, place, value), physics) for value in (0.1, 0.9)] for x in bases)
+        if bases and all(_are_alike(sample.attempts.rollouts(pair)) for pair in pairs):
+            text = f"parameter {names[place]} of the controller changes nothing in {len(bases)} controllers"
+            yield Remark("parameters", Severity.DOUBT, f"{text}; use it in start(), or leave it out")
     if len(order) < len(names):
         text = f"{len(order)} of {len(names)} parameters were tried, for want of time"
         yield Remark("parameters", Severity.FACT, text)
@@ -115,18 +107,16 @@ def _with(x: np.ndarray, place: int, value: float) -> np.ndarray:
     return changed
 
 
-def _is_same(one: Episode, other: Episode) -> bool:
-    return np.array_equal(one.xi, other.xi) and one.f == other.f and one.failure == other.failure
+def _are_alike(pair: Sequence[Episode]) -> bool:
+    """Whether two episodes are the same; of those that diverged or failed, nobody can tell."""
+    one, other = pair
+    return not {one.stop, other.stop} & UNUSABLE and not difference(one, other)
 
 
 def check_gymnasium(sample: Sample) -> Iterator[Remark]:
-    """Gymnasium's own checker has nothing against it."""
-    if not sample.usable:
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of bounds beyond [-1, 1] and of no registry, which are meant
-        try:
-            check_env(SetupEnvironment(replace(sample.setup)), skip_render_check=True)
-        except Exception as error:  # noqa: BLE001 - its checker raises anything, and so does users' code
-            text = f"Gymnasium's checker refuses it: {describe(error)}"
-            yield Remark("gymnasium", Severity.MISTAKE, text)
+    """Gymnasium's own checker has nothing against it; what it raises breaks the check off, and is told."""
+    if sample.usable:
+        with warnings.catch_warnings(), closing(SetupEnvironment(sample.setup)) as environment:
+            warnings.simplefilter("ignore")  # of bounds beyond [-1, 1] and of no registry, which are meant
+            check_env(environment, skip_render_check=True)
+    return iter(())

@@ -4,10 +4,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from workers.attempts import Attempts
+from workers.attempts import Attempts, SafeRollouts
+from workers.collection.independence import ends
 from workers.collection.shard import ShardReport, collect_shard
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
@@ -33,6 +35,8 @@ class Sample:
         dataset: that holds them, in a folder that goes with the sample.
         report: of its one shard.
         seconds: of one episode.
+        timeout: longest duration of an episode, in s.
+        attempts: rolls out further controllers, where whatever their code does ends no check.
     """
 
     setup: Setup
@@ -41,6 +45,8 @@ class Sample:
     dataset: Dataset
     report: ShardReport
     seconds: float
+    timeout: float
+    attempts: SafeRollouts
 
     @property
     def usable(self) -> dict[int, Episode]:
@@ -51,10 +57,11 @@ class Sample:
         """How many episodes go into that time."""
         return int(seconds / max(self.seconds, 1e-6))
 
-    def roll_out_again(self, index: int) -> Episode:
-        """Roll out an episode of the sample alone, in a fresh environment of this process."""
-        with Attempts(self.setup) as attempts:
-            return attempts.rollout(*draw(self.setup, self.seed, index))
+    @cached_property
+    def ends(self) -> dict[int, Episode]:
+        """The first and the last usable episode, rolled out one right after the other in another process."""
+        with IsolatedAttempts(self.setup, self.timeout) as attempts:
+            return ends(self.setup, self.seed, 1, dict(enumerate(self.episodes)), attempts)
 
 
 @contextmanager
@@ -77,7 +84,7 @@ def sample(setup: Setup, seed: int, timeout: float, time_limit: float = SECONDS)
         episodes += attempts.rollouts(draw(setup, seed, index) for index in range(FEWEST, count))
         dataset = create(Path(folder), identity_of(setup, seed=seed, episodes_per_shard=count))
         report = collect_shard(setup, dataset, Shard(0, count), lambda *_: episodes)
-        yield Sample(setup, seed, episodes, dataset, report, seconds)
+        yield Sample(setup, seed, episodes, dataset, report, seconds, timeout, attempts)
 
 
 def _seconds(setup: Setup, seed: int, episodes: Sequence[Episode], timeout: float) -> float:

@@ -32,7 +32,21 @@ def notes(dataset: Dataset) -> list[str]:
         ValueError: a file is damaged.
     """
     looked = [dataset.read(shard) for shard in _spread(dataset.shards())]
-    return [*_endings(looked), *_constants(dataset, looked), *_narrow_channels(dataset, looked)]
+    return [*_endings(looked), *value_notes(dataset, looked)]
+
+
+def value_notes(dataset: Dataset, looked: Sequence[Columns]) -> Iterator[str]:
+    """Tell what is odd about the values of episodes that came to their end.
+
+    Args:
+        dataset: that they belong to.
+        looked: episodes of some of its files.
+
+    Yields:
+        A sentence for each constant, and for each channel that hardly moves, with the remedy.
+    """
+    yield from _constants(dataset, looked)
+    yield from _narrow_channels(dataset, looked)
 
 
 def _spread(shards: Sequence[Shard]) -> list[Shard]:

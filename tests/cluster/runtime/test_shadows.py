@@ -47,6 +47,9 @@ def test_a_package_hides_a_library_and_a_folder_of_data_does_not(tmp_path):
 def test_files_that_hide_nothing_are_let_alone(tmp_path, name):
     (tmp_path / name).write_text(POISON, encoding="utf-8")
     require_no_shadows(tmp_path)
+    (tmp_path / "torch.py").write_text(POISON, encoding="utf-8")
+    with pytest.raises(UserError, match=r"torch\.py hides"):  # and it is not that nothing is looked at
+        require_no_shadows(tmp_path)
 
 
 def test_the_packages_own_folder_hides_nothing(tmp_path):

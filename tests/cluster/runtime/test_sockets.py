@@ -46,6 +46,8 @@ def test_the_limit_is_where_pythons_own_socket_meets_that_of_linux(temporary_fil
 def test_without_the_dashboard_nothing_puts_sockets_among_temporary_files(temporary_files):
     temporary_files(120)
     require_short_paths(RaySettings(), ())
+    with pytest.raises(UserError, match="set TMPDIR"):
+        require_short_paths(RaySettings(), DASHBOARD)
 
 
 def test_linux_takes_a_path_of_the_length_that_is_allowed_and_none_beyond(tmp_path, monkeypatch):
