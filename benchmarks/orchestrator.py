@@ -27,7 +27,7 @@ from workers import setups
 from workers.collection.shard import ShardReport, collect_shard
 from workers.dataset.folder import Dataset
 from workers.dataset.shards import Shard
-from workers.rollout import Episode
+from workers.episode import Episode
 from workers.setups import Setup
 
 SAMPLE_SECONDS = 0.5

@@ -16,7 +16,8 @@ from itertools import chain, repeat
 import numpy as np
 
 from workers import setups
-from workers.rollout import DIVERGED, Episode, random_episode
+from workers.episode import DIVERGED, Episode
+from workers.rollout import random_episode
 from workers.simulation.bullet import pybullet
 from workers.simulation.world import World
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from workers.episode import Failure
 from workers.physics import Physics
-from workers.rollout import Failure
 
 
 def failure_text(

@@ -14,8 +14,9 @@ import numpy as np
 
 from workers.controllers.controller import unit_cube
 from workers.environments.environment import Environment
+from workers.episode import Episode, Failure
 from workers.physics import Physics
-from workers.rollout import Episode, Failure, failed_episode, rollout
+from workers.rollout import failed_episode, rollout
 from workers.setups import Setup
 from workers.user_code import describe, full_traceback
 

@@ -8,7 +8,8 @@ import numpy as np
 from gymnasium import spaces
 
 from workers.environments.environment import Channel, Observed
-from workers.rollout import DIVERGED, diverged_objective, sane_steps
+from workers.episode import DIVERGED
+from workers.rollout import diverged_objective, sane_steps
 from workers.setups import Setup
 
 

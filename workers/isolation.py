@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from workers.attempts import TIMEOUT_SECONDS, Attempts, SafeRollouts
+from workers.episode import Episode, Failure
 from workers.physics import Physics
-from workers.rollout import Episode, Failure
 from workers.setups import Setup, load
 from workers.setups.user_bad import with_bad
 

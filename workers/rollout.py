@@ -10,8 +10,7 @@ Example:
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from jaxtyping import Float32, UInt8
 
 from workers.controllers.controller import Command, unit_cube
 from workers.environments.environment import Channel, Environment, Observed, check_observed
+from workers.episode import DIVERGED, FAILED, Episode, Failure, Stored, degrees
 from workers.physics import Physics
 from workers.randomness import Stream, generator
 from workers.setups import Setup
@@ -27,61 +27,6 @@ from workers.tasks.task import Bad, check_bad
 
 VERSION = 1
 """It is part of a dataset's identity: raise it whenever an episode's bytes change."""
-
-DIVERGED = "diverged"
-"""It is the stop reason of an episode in which something was not finite or left its bounds."""
-FAILED = "failed"
-"""It is the stop reason of an episode whose code raised, hung or ended its process: `workers.attempts`."""
-UNUSABLE = frozenset({DIVERGED, FAILED})
-"""No model learns from episodes with these stop reasons."""
-
-Stored = UInt8[np.ndarray, " time"] | Float32[np.ndarray, " time"]
-"""It holds per step one bit for each bad condition, or the degree in [0, 1] of a graded G_bad."""
-
-
-@dataclass(frozen=True)
-class Failure:
-    """What an episode failed of.
-
-    Attributes:
-        reason: in one line; type, message, file and line where they are known.
-        text: all that is known, a traceback as a rule.
-    """
-
-    reason: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Episode:
-    """The record of one rollout.
-
-    Attributes:
-        x: the controller, in [0,1]^D.
-        xi: the trajectory ξ, in the units of the setup's channels.
-        bad: per step, one bit for each bad condition; the degree in [0, 1] of a graded G_bad.
-        y: badness, the fraction of bad steps or the mean degree, in [0, 1].
-        f: the objective.
-        stop: why it ended early; "" when it ran to its horizon, "diverged" when the simulation exploded,
-            "failed" when code raised, or the reason of the setup's stop rule. From there on ξ repeats the
-            last state.
-        physics: the parameters it ran under.
-        failure: what a failed episode failed of, for people; it is not stored with the episode.
-
-    A diverged or failed episode is bad throughout, and no model may learn from it. A stopped one is a fact
-    about its controller, and may be learnt from: the step that gave the reason and all that were not run are
-    bad as `stopped`; those before have the conditions that were seen, and f is the task's
-    `stopped_objective`.
-    """
-
-    x: Float32[np.ndarray, " d"]
-    xi: Float32[np.ndarray, "obs time"]
-    bad: Stored
-    y: float
-    f: float
-    stop: str
-    physics: Mapping[str, float]
-    failure: Failure | None = None
 
 
 def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Physics) -> Episode:
@@ -266,26 +211,6 @@ def sane_steps(xi: Float32[np.ndarray, "obs time"], channels: tuple[Channel, ...
     high = np.array([channel.high for channel in channels], dtype=np.float32)[:, None] + slack
     insane = np.flatnonzero(~(np.isfinite(xi) & (xi >= low) & (xi <= high)).all(axis=0))
     return int(insane[0]) if insane.size else xi.shape[1]
-
-
-def degrees(
-    bad: UInt8[np.ndarray, "*episodes time"] | Float32[np.ndarray, "*episodes time"],
-) -> Float32[np.ndarray, "*episodes time"]:
-    """How bad each step is: the degree itself, or 1 where any bit is set."""
-    return bad if bad.dtype == np.float32 else (bad != 0).astype(np.float32)
-
-
-def stride_steps(horizon: int, stride: int) -> slice:
-    """Choose the steps that a model sees of an episode: the last one of every whole stride.
-
-    Args:
-        horizon: T, control steps.
-        stride: control steps per sample, at least 1.
-
-    Returns:
-        horizon // stride places on the axis of time.
-    """
-    return slice(stride - 1, horizon // stride * stride, stride)
 
 
 def _encode_bad(is_bad: Bad) -> Stored:

@@ -17,9 +17,9 @@ from svaedc.bo.loop import Outcome
 from svaedc.bo.online import Adjustable
 from svaedc.bo.strategies import Method
 from svaedc.model.svae_dc import SvaeDc
+from workers.episode import FAILED, Episode
 from workers.physics import Physics
 from workers.randomness import Stream, generator
-from workers.rollout import FAILED, Episode
 from workers.setups import Setup
 
 DRAWS: Final = 2

@@ -12,9 +12,10 @@ from cluster.inputs import dataset_location, usage_errors
 from cluster.progress import say
 from workers.controllers.controller import unit_cube
 from workers.dataset.folder import Dataset, open_dataset
+from workers.episode import Episode
 from workers.physics import Physics
 from workers.randomness import Stream, generator
-from workers.rollout import Episode, rollout
+from workers.rollout import rollout
 from workers.setups import Setup
 from workers.user_code import describe, full_traceback
 

@@ -14,8 +14,8 @@ from cluster.errors import UsageError
 from cluster.inputs import usage_errors
 from cluster.progress import ProgressLine
 from cluster.rendering.video import Picture, require_writable
+from workers.episode import Episode
 from workers.pictures import Size, frames, scenery_of
-from workers.rollout import Episode
 from workers.setups import Setup
 
 RED = (206, 32, 41)

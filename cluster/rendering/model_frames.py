@@ -19,8 +19,8 @@ from svaedc.model.reconstruction import Reconstruction, reconstructions, remarka
 from svaedc.model.svae_dc import SvaeDc
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset
+from workers.episode import Episode, degrees, stride_steps
 from workers.pictures import Size, frames, scenery_of
-from workers.rollout import Episode, degrees, stride_steps
 from workers.setups import Setup
 
 ACROSS = 2  # blocks beside each other

@@ -3,7 +3,7 @@
 import shlex
 
 from cluster.failures import failure_text
-from workers.rollout import Failure
+from workers.episode import Failure
 
 FAILURE = Failure(
     "KeyError: 'puck', at arm.py:12 in step: masses['puck']", "Traceback ...\nKeyError: 'puck'\n"

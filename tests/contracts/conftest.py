@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from workers import setups
-from workers.rollout import Episode, random_episode
+from workers.episode import Episode
+from workers.rollout import random_episode
 
 FOLDER = Path(__file__).parents[2] / "examples"
 EXAMPLES = ("two_link_pusher", "cart_pole", "gymnasium_hopper")

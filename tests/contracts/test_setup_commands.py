@@ -6,9 +6,10 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 from tests.contracts.steps import commands_of, nominal
+from workers.episode import Episode
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import Stream, generator
-from workers.rollout import Episode, rollout
+from workers.rollout import rollout
 from workers.tasks.stop import STOPPED
 
 

@@ -6,7 +6,8 @@ That it is the same in another process is one of the checks of `test_conformance
 import numpy as np
 import pytest
 
-from workers.rollout import Episode, random_episode
+from workers.episode import Episode
+from workers.rollout import random_episode
 
 
 def _bytes(episode: Episode) -> bytes:

@@ -11,7 +11,8 @@ from tests.own_robot import write_robot
 from workers.attempts import Attempts
 from workers.dataset.folder import open_dataset
 from workers.dataset.verification import verify
-from workers.rollout import FAILED, draw
+from workers.episode import FAILED
+from workers.rollout import draw
 
 ACT = """    def act(self, force):
         if force > 0.97:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from workers.attempts import Attempts
-from workers.rollout import FAILED, draw, rollout
+from workers.episode import FAILED
+from workers.rollout import draw, rollout
 
 RAISES = ("force = command[0]", "force = {True: command[0]}[command[0] < 0.9]")
 """For one in ten of all controllers, a dictionary has no such key."""

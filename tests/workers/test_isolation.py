@@ -3,8 +3,9 @@
 import pytest
 
 from workers.attempts import Attempts
+from workers.episode import FAILED
 from workers.isolation import IsolatedAttempts
-from workers.rollout import FAILED, draw
+from workers.rollout import draw
 
 COUNT = 12
 

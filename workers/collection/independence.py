@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from workers.attempts import SafeRollouts
+from workers.episode import UNUSABLE, Episode
 from workers.isolation import IsolatedAttempts
-from workers.rollout import UNUSABLE, Episode, draw, storable
+from workers.rollout import draw, storable
 from workers.setups import Setup
 
 REMEDY = (

@@ -13,8 +13,9 @@ from workers.dataset.folder import Dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.storage.temporary import host
+from workers.episode import DIVERGED, FAILED, UNUSABLE, Episode, Failure
 from workers.physics import Physics
-from workers.rollout import DIVERGED, FAILED, UNUSABLE, Episode, Failure, draw, rollout, storable
+from workers.rollout import draw, rollout, storable
 from workers.setups import SETUPS, Setup
 from workers.tasks.task import require_objective
 from workers.user_code import UserCodeError, describe

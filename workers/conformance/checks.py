@@ -9,7 +9,7 @@ from workers.collection.independence import REMEDY, difference, told_dependence
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample
 from workers.dataset.notes import value_notes
-from workers.rollout import DIVERGED, FAILED
+from workers.episode import DIVERGED, FAILED
 
 _JUMP = math.pi
 """An angle that changes by so much within a step, in rad, has come round to the other end of its range."""

@@ -12,9 +12,10 @@ from workers.collection.independence import difference
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample
 from workers.environments.environment import Channel
+from workers.episode import UNUSABLE, Episode
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import Stream, generator
-from workers.rollout import UNUSABLE, Episode, draw, rollout
+from workers.rollout import draw, rollout
 
 SECONDS = 10.0
 """Each of these checks takes about so long."""

@@ -14,8 +14,9 @@ from workers.collection.shard import ShardReport, collect_shard
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
+from workers.episode import FAILED, UNUSABLE, Episode
 from workers.isolation import IsolatedAttempts
-from workers.rollout import FAILED, UNUSABLE, Episode, draw
+from workers.rollout import draw
 from workers.setups import Setup
 
 SECONDS = 10.0

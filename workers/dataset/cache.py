@@ -17,7 +17,7 @@ from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location
 from workers.dataset.storage.temporary import is_dead, writer
-from workers.rollout import UNUSABLE, degrees, stride_steps
+from workers.episode import UNUSABLE, degrees, stride_steps
 
 _CHANGED = "{} was changed while it was decoded; let whatever repairs or replaces it end, and run this again"
 

@@ -14,7 +14,7 @@ from workers.dataset.manifest import MANIFEST, ensure_manifest, manifest_text
 from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
-from workers.rollout import UNUSABLE, Episode
+from workers.episode import UNUSABLE, Episode
 
 
 @dataclass(frozen=True)

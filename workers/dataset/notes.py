@@ -9,7 +9,7 @@ from jaxtyping import Float32
 from workers.dataset.folder import Dataset
 from workers.dataset.schema import Columns
 from workers.dataset.shards import Shard
-from workers.rollout import DIVERGED, FAILED, UNUSABLE
+from workers.episode import DIVERGED, FAILED, UNUSABLE
 
 SHARDS = 4
 """So many files are looked at, spread over the dataset."""

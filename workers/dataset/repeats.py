@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from workers.dataset.folder import Dataset
-from workers.rollout import UNUSABLE
+from workers.episode import UNUSABLE
 
 TRAJECTORIES = 1_000
 """At most so many episodes are used for the share of ξ."""

@@ -17,7 +17,7 @@ from workers.dataset.ownership import IDENTITY_DIGEST, IDENTITY_TEXT, identity_i
 from workers.dataset.quantisation import decode, describe_encoding, encode
 from workers.dataset.storage.location import Location, arrow_name, source
 from workers.dataset.storage.s3_connection import refusal
-from workers.rollout import Episode
+from workers.episode import Episode
 
 ROW_GROUP = 64  # episodes
 _XI, _BAD = "xi.list.element", "bad.list.element"

@@ -9,7 +9,7 @@ from jaxtyping import Float64
 
 from workers.dataset.folder import Dataset
 from workers.dataset.schema import Bad
-from workers.rollout import DIVERGED, FAILED, UNUSABLE
+from workers.episode import DIVERGED, FAILED, UNUSABLE
 
 MARKS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """These quantiles describe the objective."""

@@ -12,9 +12,9 @@ from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
+from workers.episode import UNUSABLE, degrees
 from workers.physics import PhysicsRanges
 from workers.randomness import Stream, generator
-from workers.rollout import UNUSABLE, degrees
 from workers.tasks.stop import STOPPED
 
 

@@ -27,7 +27,7 @@ def shown(episode, stride: int):
     """A telling whose model repeats the episode exactly."""
     from cluster.rendering.model_frames import ModelView
     from svaedc.model.reconstruction import Reconstruction
-    from workers.rollout import stride_steps
+    from workers.episode import stride_steps
 
     xi = episode.xi[:, stride_steps(500, stride)]
     told = (Reconstruction("reconstructed", xi, 0.25), Reconstruction("generated", xi, float("nan")))

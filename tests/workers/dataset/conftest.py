@@ -33,9 +33,9 @@ def identity():
 @pytest.fixture
 def episodes_of():
     """(identity, indices) -> the episodes with those indices, each a function of (seed, index) alone."""
+    from workers.episode import Episode
     from workers.physics import PhysicsRanges
     from workers.randomness import Stream, generator
-    from workers.rollout import Episode
 
     def episode(identity, index: int) -> Episode:
         rng = np.random.default_rng([identity.seed, zlib.crc32(b"toy"), index])

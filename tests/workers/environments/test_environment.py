@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from workers.rollout import DIVERGED, draw, random_episode, rollout
+from workers.episode import DIVERGED
+from workers.rollout import draw, random_episode, rollout
 
 RETURNS = "return Observed(np.array(records, dtype=np.float32).T, {})"
 

@@ -9,7 +9,8 @@ import pytest
 
 from workers import setups
 from workers.collection.shard import require_working
-from workers.rollout import Episode, random_episode
+from workers.episode import Episode
+from workers.rollout import random_episode
 from workers.tasks.task import Task
 
 HORIZON = 5
