@@ -16,6 +16,7 @@ from workers.attempts import TIMEOUT_SECONDS, Attempts, SafeRollouts
 from workers.episode import Episode, Failure
 from workers.physics import Physics
 from workers.setups import Setup, load
+from workers.setups.declared import changes, declaration
 from workers.setups.user_bad import with_bad
 
 
@@ -25,10 +26,14 @@ class IsolatedAttempts(SafeRollouts):
     Args:
         setup: whose controllers are rolled out; the child loads it by its name.
         timeout: longest duration of an episode, in s.
+
+    Raises:
+        ValueError: the setup is not the one of its name, which the child would roll out instead.
     """
 
     def __init__(self, setup: Setup, timeout: float = TIMEOUT_SECONDS) -> None:
         super().__init__(setup)
+        _require_as_named(setup)
         self._timeout = timeout
         self._folder = TemporaryDirectory(prefix="svaedc-")
         self._child: ProcessPoolExecutor | None = None
@@ -74,6 +79,15 @@ class IsolatedAttempts(SafeRollouts):
             self._child.shutdown()
         self._child = None
         self._folder.cleanup()
+
+
+def _require_as_named(setup: Setup) -> None:
+    own, named = declaration(setup), declaration(with_bad(load(setup.name), setup.task.bad_name))
+    if own != named:
+        raise ValueError(
+            f"a child process loads {setup.name!r} by its name, which must give the same setup; it differs in "
+            f"{'; '.join(map(str, changes(own, named)))}: make a module that states it, under its own name"
+        )
 
 
 _attempts: Attempts

@@ -1,5 +1,7 @@
 """Episodes that hang or end their process fail alone, and say of what."""
 
+from dataclasses import replace
+
 import pytest
 
 from workers.attempts import Attempts
@@ -47,3 +49,9 @@ def test_whatever_an_episode_does_costs_itself(own_robot, deed, reason):
             assert other.failure.reason.startswith(reason)
     if "sleep" in deed:
         assert "deadly_glider.py" in next(each.failure.text for each in found if each.failure)
+
+
+def test_a_setup_that_its_name_does_not_give_is_refused(own_robot):
+    """The child would roll out another robot than it was given."""
+    with pytest.raises(ValueError, match=r"'glider'.* differs in horizon: 30 and 20: make a module"):
+        IsolatedAttempts(replace(own_robot(), horizon=30))

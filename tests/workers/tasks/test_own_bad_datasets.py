@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from workers import setups
 from workers.collection.shard import collect_shard
 from workers.dataset.cache import training_cache
 from workers.dataset.folder import create
@@ -17,6 +18,12 @@ from workers.dataset.verification import verify
 from workers.setups.user_bad import with_bad
 
 pytestmark = pytest.mark.usefixtures("gentle")
+
+
+@pytest.fixture(scope="session")
+def franka():
+    """The Franka as it ships: the order of episodes is tried in a process that loads it by its name."""
+    return setups.load("franka")
 
 
 @pytest.fixture
