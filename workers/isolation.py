@@ -85,8 +85,8 @@ def _require_as_named(setup: Setup) -> None:
     own, named = declaration(setup), declaration(with_bad(load(setup.name), setup.task.bad_name))
     if own != named:
         raise ValueError(
-            f"a child process loads {setup.name!r} by its name, which must give the same setup; it differs in "
-            f"{'; '.join(map(str, changes(own, named)))}: make a module that states it, under its own name"
+            f"a child process loads {setup.name!r} by its name, which must give the same setup; they differ "
+            f"in {'; '.join(map(str, changes(own, named)))}: write it into a module of its own"
         )
 
 
