@@ -26,17 +26,20 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP) ## the whole pipeline, small and real: collect, train, compare
 	$(BIN)/svaedc demo
 
-# Tests of clusters and servers wait more than they compute: the others run beside them, and are shown afterwards.
-CLUSTERS := tests/cluster tests/end_to_end
-COMPUTING := .pytest_cache/computing.log
+# Tests of clusters and servers wait more than they compute: three runs side by side, two of them shown afterwards.
+DRIVERS := tests/cluster/comparison tests/cluster/hardware tests/cluster/training
+COMMANDS := tests/cluster tests/end_to_end
+LOGS := .pytest_cache
 test: $(STAMP) ## the tests that take seconds each
-	@mkdir -p $(dir $(COMPUTING))
-	@$(BIN)/python -m pytest tests $(CLUSTERS:%=--ignore=%) > $(COMPUTING) 2>&1 & computing=$$!; \
-	$(BIN)/python -m pytest $(CLUSTERS); clusters=$$?; \
-	wait $$computing; computed=$$?; cat $(COMPUTING); exit $$((clusters + computed))
+	@mkdir -p $(LOGS)
+	@$(BIN)/python -m pytest tests $(COMMANDS:%=--ignore=%) > $(LOGS)/computing.log 2>&1 & computing=$$!; \
+	$(BIN)/python -m pytest $(DRIVERS) > $(LOGS)/drivers.log 2>&1 & drivers=$$!; \
+	$(BIN)/python -m pytest $(COMMANDS) $(DRIVERS:%=--ignore=%); failed=$$?; \
+	for run in $$computing $$drivers; do wait $$run || failed=1; done; \
+	cat $(LOGS)/computing.log $(LOGS)/drivers.log; exit $$failed
 
 test-docs: $(STAMP) ## run every command of the documentation and compare what it prints; ten minutes
-	$(BIN)/python -m pytest -m documentation tests/documentation
+	$(BIN)/python -m pytest -m documentation
 
 test-slow: $(STAMP) ## the tests that take minutes, and the property tests with fresh examples
 	HYPOTHESIS_PROFILE=exploring $(BIN)/python -m pytest -m "slow or hypothesis"

@@ -54,8 +54,7 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
     environment.reset(physics)
     command = setup.controller.start(controller, environment, setup.horizon)
     if setup.stop is never:
-        step = environment.step
-        records, reason = [step(command(t)) for t in range(setup.horizon)], ""
+        records, reason = environment.run_commands(command, setup.horizon), ""
     else:
         records, reason = _run_until_stop(setup, environment, command)
     observed = check_observed(environment.observed(records), setup.observation, len(records), setup.name)
@@ -132,7 +131,7 @@ def failed_episode(setup: Setup, x: np.ndarray, physics: Physics, failure: Failu
     return replace(episode, failure=failure)
 
 
-def _run_until_stop(setup: Setup, environment: Environment, command: Command) -> tuple[list[Any], str]:
+def _run_until_stop(setup: Setup, environment: Environment, command: Command) -> tuple[Any, str]:
     """The records up to the step at which the setup's rule stops, that one included, and its reason."""
     records = []
     for t in range(setup.horizon):

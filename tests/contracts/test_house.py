@@ -19,7 +19,13 @@ IRREGULAR = frozenset(
     {"found", "begun", "known", "told", "drawn", "held", "lost", "spent", "given", "done", "made"}
 )
 KEPT = frozenset(
-    {f"{name}.observed" for name in ("Environment", "Daisy", "GymnasiumWorld", "Point", "Tabletop")}
+    {
+        f"{name}.observed"
+        for name in (
+            *("Environment", "Daisy", "GymnasiumWorld", "Point", "Tabletop"),
+            *("MujocoDaisy", "MujocoTabletop"),
+        )
+    }
     | {"Outcome.found"}
 )
 """What users' own environments implement keeps its name."""

@@ -106,6 +106,7 @@ def test_a_method_or_a_setup_that_does_not_exist_is_named():
         svaedc.open_dataset("/nowhere/at/all")
 
 
+@pytest.mark.documentation
 def test_the_notebook_runs_from_top_to_bottom(tmp_path):
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     NotebookClient(notebook, timeout=400, resources={"metadata": {"path": str(tmp_path)}}).execute()

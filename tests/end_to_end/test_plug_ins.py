@@ -92,6 +92,7 @@ def test_lists_name_what_ships_and_what_packages_offer_and_go_on_behind_a_broken
     assert "rehearsal:SETUP" in robots.stdout
 
 
+@pytest.mark.slow
 def test_a_setup_and_methods_of_others_are_compared_on_ray_and_a_changed_file_is_named(folder):
     done = svaedc(folder, *COMPARE, *GRID)
     assert done.returncode == 0, done.stderr

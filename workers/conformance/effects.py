@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from workers.collection.independence import difference
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample
-from workers.environments.environment import Channel
+from workers.environments.environment import Channel, Environment
 from workers.episode import UNUSABLE, Episode
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import Stream, generator
@@ -46,6 +47,7 @@ def check_commands(sample: Sample) -> Iterator[Remark]:
             return step(command)
 
         environment.step = listen  # type: ignore[method-assign]
+        environment.run_commands = partial(Environment.run_commands, environment)  # type: ignore[method-assign]
         for index in list(sample.usable)[:CONTROLLERS]:
             rollout(sample.setup, environment, *draw(sample.setup, sample.seed, index))
         yield from _check_commands(commands, environment.action)

@@ -1,16 +1,15 @@
 """What a controller is to the control loop, and how x is checked."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
 
-from workers.environments.environment import Channel
+from workers.environments.environment import Channel, Command
 
-Command = Callable[[int], Sequence[float]]
-"""It leads from the index of a control step to the command applied in it."""
+__all__ = ["Command", "Controller", "unit_cube"]
 
 
 class Controller(ABC):

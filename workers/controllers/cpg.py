@@ -10,7 +10,7 @@ other base, and each shoulder and elbow to the base of its leg, all with w = 10;
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from jaxtyping import Float, Float32
 
 from workers.controllers.controller import Command, Controller
 from workers.environments.environment import Channel
+from workers.plans import JointPlan, PlannedCommand
 
 LEGS = ("LF", "LM", "LB", "RB", "RM", "RF")
 """The oscillators stand in this order, once around the body."""
@@ -130,7 +131,8 @@ class PatternGenerator(Controller):
         def command(step: int) -> list[float]:
             return rows[step].tolist()
 
-        return command
+        unlimited = (inf,) * rows.shape[1]
+        return PlannedCommand(command, JointPlan(rows, tuple(-end for end in unlimited), unlimited))
 
     def commands(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "horizon 18"]:
         """Plan the joint angles of all steps.

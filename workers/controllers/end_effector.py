@@ -9,7 +9,8 @@ from jaxtyping import Float32
 from workers.controllers.controller import Command, Controller
 from workers.controllers.reference import ends, euler_angles, reference
 from workers.environments.environment import Channel
-from workers.environments.tabletop import Tabletop
+from workers.environments.tabletop import ArmScene
+from workers.plans import HandPlan, PlannedCommand
 
 Triple = tuple[float, float, float]
 
@@ -70,7 +71,7 @@ class EndEffectorWaypoints(Controller):
         self._turning = turning
         self._limits = torque_limits
 
-    def start(self, x: Float32[np.ndarray, " d"], environment: Tabletop, horizon: int) -> Command:
+    def start(self, x: Float32[np.ndarray, " d"], environment: ArmScene, horizon: int) -> Command:
         """Plan from the hand's present pose; the command of a step reads the arm's state at that step.
 
         Args:
@@ -88,12 +89,12 @@ class EndEffectorWaypoints(Controller):
         turns[0] += 2 * np.pi * np.round((turns[1] - turns[0]) / (2 * np.pi))  # the short way round
         targets = reference(corners, turns, horizon, environment.control_step)
         gains = np.repeat(points[:, 6:], np.diff(ends(horizon, self._waypoints)), axis=0)
-        steps = np.hstack([*targets, gains])  # as floats, they would fill the caches
-        turning, limits = self._turning, self._limits
+        plan = HandPlan(np.hstack([*targets, gains]), self._turning, self._limits)
+        steps, turning, limits = plan.rows, plan.turning, plan.torque_limits
 
         def command(step: int) -> Sequence[float]:
             state = arm.state
-            row = steps[step].tolist()
+            row = steps[step].tolist()  # kept as floats, they would fill the caches
             force = _force(
                 row[_GAINS],
                 row[_POSITION],
@@ -107,7 +108,7 @@ class EndEffectorWaypoints(Controller):
             )
             return _torque(force, moment, arm.jacobian(), arm.gravity_torque(), limits)
 
-        return command
+        return PlannedCommand(command, plan)
 
 
 def _force(

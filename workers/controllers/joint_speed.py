@@ -9,7 +9,8 @@ from jaxtyping import Float, Float32
 from workers.controllers.controller import Command, Controller
 from workers.controllers.reference import minimum_jerk
 from workers.environments.environment import Channel
-from workers.environments.tabletop import Tabletop
+from workers.environments.tabletop import ArmScene
+from workers.plans import JointPlan, PlannedCommand
 
 SHARE = (0.1, 1.0)
 """The durations of waypoints lie in this range before they are divided by their sum. It does not begin at 0,
@@ -47,7 +48,7 @@ class JointSpeedWaypoints(Controller):
         speeds = [(joint, limit) for joint, limit in zip(joints, speed_limits, strict=True)]
         self.parameters = tuple(chain.from_iterable(_channels(n, speeds) for n in range(1, waypoints + 1)))
 
-    def start(self, x: Float32[np.ndarray, " d"], environment: Tabletop, horizon: int) -> Command:
+    def start(self, x: Float32[np.ndarray, " d"], environment: ArmScene, horizon: int) -> Command:
         """Plan all speeds; the command of a step reads the joints at that step.
 
         Args:
@@ -65,7 +66,7 @@ class JointSpeedWaypoints(Controller):
         def command(step: int) -> Sequence[float]:
             return _inwards(plan[step].tolist(), arm.state.joints, lower, upper)
 
-        return command
+        return PlannedCommand(command, JointPlan(plan, lower, upper))
 
     def plan(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "time joints"]:
         """Plan the joint speeds of all steps, whatever the joints' angles.

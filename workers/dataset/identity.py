@@ -43,6 +43,7 @@ class Identity:
         bad_digest: SHA-256 of the file that defines it.
         setup_digest: SHA-256 of the file of a user's setup; "" for those that ship.
         storage: how ξ is stored: `float32`, or `int16` codes between the bounds of its channels.
+        packages: name and version of every further package that decides the bytes of an episode.
     """
 
     setup: str
@@ -64,6 +65,7 @@ class Identity:
     bad_digest: str = ""
     setup_digest: str = ""
     storage: str = "float32"
+    packages: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse shards without episodes, controllers without them, and unknown storages."""
@@ -93,8 +95,8 @@ class Identity:
         """
         values: dict[str, Any] = json.loads(text)
         try:
-            for name in ("parameters", "observation"):
-                values[name] = tuple(tuple(row) for row in values[name])
+            for name in ("parameters", "observation", "packages"):
+                values[name] = tuple(tuple(row) for row in values.get(name, ()))
             values["conditions"] = tuple(values["conditions"])
             values["physics"] = {name: tuple(interval) for name, interval in values["physics"].items()}
             return cls(**values)
@@ -199,6 +201,7 @@ def identity_of(
         bad_digest=setup.task.bad_digest,
         setup_digest=setup.code,
         storage=storage,
+        packages=tuple((name, version(name)) for name in setup.packages),
     )
 
 

@@ -1,7 +1,7 @@
 """What every simulated environment offers to the control loop."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -14,6 +14,9 @@ from workers.physics import Physics
 from workers.simulation.artist import Artist
 from workers.simulation.scenery import Scenery
 from workers.user_code import UserCodeError
+
+Command = Callable[[int], Sequence[float]]
+"""It leads from the index of a control step to the command applied in it."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -139,6 +142,22 @@ class Environment(ABC):
     @abstractmethod
     def step(self, command: Sequence[float]) -> Any:
         """Apply one command, advance one control step, and return the raw record of what is seen then."""
+
+    def run_commands(self, command: Command, steps: int) -> Any:
+        """Apply the commands of the steps from 0 on, one after the other.
+
+        This is the control loop. An environment that can execute the plan behind a command by itself
+        (`workers.plans`) may do so, with the same records.
+
+        Args:
+            command: of each step.
+            steps: how many.
+
+        Returns:
+            The record of each step, together as `observed` takes them.
+        """
+        step = self.step
+        return [step(command(t)) for t in range(steps)]
 
     @abstractmethod
     def record(self) -> Any:

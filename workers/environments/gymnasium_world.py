@@ -196,9 +196,9 @@ def _let_explode(world: World) -> None:
     """MuJoCo sets a simulation that explodes back to its start and goes on: keep it from that."""
     model: Any = getattr(world.unwrapped, "model", None)
     if type(model).__module__.partition(".")[0] == "mujoco":
-        import mujoco
+        from workers.mujoco.library import keep_exploded
 
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        keep_exploded(model)
 
 
 def name_of(world: World) -> str:

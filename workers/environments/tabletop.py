@@ -13,7 +13,7 @@ from jaxtyping import Float
 from workers.environments.drive import Drive
 from workers.environments.environment import Channel, Environment, Observed
 from workers.physics import Physics, PhysicsRanges, around
-from workers.simulation.arm import Arm, ArmModel
+from workers.simulation.arm import Arm, ArmModel, ArmReadings
 from workers.simulation.cylinder import Cylinder
 from workers.simulation.scenery import Camera, Ground, Interval, Machine, Roll, Scenery
 from workers.simulation.world import World
@@ -120,8 +120,17 @@ with tuples an episode took a tenth longer.
 """
 
 
-class Tabletop(Environment):
-    """The simulated scene of a `TabletopModel`; the table's surface is the plane z = 0."""
+class ArmScene(Environment):
+    """An arm over a table, in whichever engine; the table's surface is the plane z = 0.
+
+    Args:
+        model: of the scene.
+
+    Attributes:
+        arm: what controllers read of it.
+    """
+
+    arm: ArmReadings
 
     def __init__(self, model: TabletopModel) -> None:
         self.observation = model.observation()
@@ -129,6 +138,30 @@ class Tabletop(Environment):
         self.control_step = model.control_step
         self.scenery = model.scenery()
         self._model = model
+
+    def _read_columns(self, columns: Float[np.ndarray, "width time"]) -> Observed:
+        """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T].
+
+        The rows are joint angles, each object's position and quaternion, the hand's position, table contact.
+        """
+        objects = len(self._model.cylinders)
+        rows = [columns[: len(self.observation) - 9 * objects]]
+        poses = columns[len(rows[0]) : -4].reshape(objects, 7, columns.shape[1])
+        for pose in poses:
+            rows += [pose[:3], first_two_axes(pose[3:].T)]
+        return Observed(
+            xi=np.concatenate(rows).astype(np.float32),
+            signals={"hand_position": columns[-4:-1], "table_contact": columns[-1] != 0.0},
+        )
+
+
+class Tabletop(ArmScene):
+    """The scene in PyBullet."""
+
+    arm: Arm
+
+    def __init__(self, model: TabletopModel) -> None:
+        super().__init__(model)
         self._build()
 
     def _build(self) -> None:
@@ -183,14 +216,7 @@ class Tabletop(Environment):
     def observed(self, records: Sequence[Record]) -> Observed:
         """ξ in the order of `observation`; signals: `hand_position` [3, T] and `table_contact` [T]."""
         columns = np.frombuffer(b"".join(records)).reshape(len(records), -1).T
-        rows = [columns[: len(self.observation) - 9 * len(self._cylinders)]]
-        poses = columns[len(rows[0]) : -4].reshape(len(self._cylinders), 7, len(records))
-        for pose in poses:
-            rows += [pose[:3], first_two_axes(pose[3:].T)]
-        return Observed(
-            xi=np.concatenate(rows).astype(np.float32),
-            signals={"hand_position": columns[-4:-1], "table_contact": columns[-1] != 0.0},
-        )
+        return self._read_columns(columns)
 
     def close(self) -> None:
         """End the simulation."""

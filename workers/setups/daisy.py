@@ -1,4 +1,4 @@
-"""Daisy, a hexapod that walks: the setups `daisy-27d`, `daisy-11d` and `daisy-11d-rehearsal`."""
+"""Daisy, a hexapod that walks: the setups `daisy-27d`, `daisy-11d`, both `-mujoco`, `daisy-11d-rehearsal`."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -59,6 +59,31 @@ def daisy_11d() -> Setup:
         nominal=NOMINAL,
         objective_limits=LIMITS_11D,
     )
+
+
+def daisy_27d_mujoco() -> Setup:
+    """The setup `daisy-27d` in another engine.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    return _in_mujoco(daisy_27d(), REACH_27D)
+
+
+def daisy_11d_mujoco() -> Setup:
+    """The setup `daisy-11d` in another engine.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    return _in_mujoco(daisy_11d(), REACH_11D)
+
+
+def _in_mujoco(setup: Setup, reach: tuple[float, float, float]) -> Setup:
+    from workers.environments.mujoco_daisy import PACKAGES, MujocoDaisy
+
+    build = partial(MujocoDaisy, DaisyModel(speeds=UNLIMITED, reach=reach))
+    return replace(setup, name=f"{setup.name}-mujoco", build=build, packages=PACKAGES)
 
 
 def daisy_11d_rehearsal() -> Setup:

@@ -1,4 +1,4 @@
-"""Franka Emika pushing two wooden rolls with joint torques: the setups `franka` and `franka-rehearsal`.
+"""Franka Emika pushing two wooden rolls with joint torques: `franka`, `-mujoco` and `-rehearsal`.
 
 The robot is the `panda.urdf` that ships with PyBullet, with the true arm's joint limits, 1 N·m·s/rad of joint
 damping, and fingers that touch nothing. There is no limit on joint speed, as in the paper's simulation.
@@ -64,6 +64,18 @@ limit for all."""
 def franka() -> Setup:
     """The setup `franka`: 48-D, 500 steps of 2 ms, f in [-1.8, 1.2] m."""
     return _pushing("franka", MODEL)
+
+
+def franka_mujoco() -> Setup:
+    """The setup `franka` in another engine.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    from workers.environments.mujoco_tabletop import PACKAGES, MujocoTabletop
+
+    build = partial(MujocoTabletop, MODEL)
+    return replace(_pushing("franka-mujoco", MODEL), build=build, packages=PACKAGES)
 
 
 def franka_rehearsal() -> Setup:

@@ -34,6 +34,8 @@ class Setup:
         stop: ends an episode early; of stand-ins for hardware only.
         code: SHA-256 of the file of a user's module; "" for the setups that ship.
         broken: an episode with f below this broke something; NaN where f does not tell.
+        packages: names of the packages, besides PyBullet and NumPy, whose versions decide the bytes of an
+            episode.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Setup:
     stop: StopRule = never
     code: str = ""
     broken: float = math.nan
+    packages: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make what a module states plain, and refuse what no dataset or optimisation can work with.

@@ -1,4 +1,4 @@
-"""ABB YuMi pushing two paper towel rolls with joint speeds: the setups `yumi` and `yumi-rehearsal`.
+"""ABB YuMi pushing two paper towel rolls with joint speeds: `yumi`, `yumi-mujoco` and `yumi-rehearsal`.
 
 The robot is a description of our own, `urdf/yumi.urdf`. Its right arm moves; the left one is a picture.
 """
@@ -57,6 +57,18 @@ def yumi() -> Setup:
     return _pushing("yumi", 0.5)
 
 
+def yumi_mujoco() -> Setup:
+    """The setup `yumi` in another engine.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    from workers.environments.mujoco_tabletop import PACKAGES, MujocoTabletop
+
+    build = partial(MujocoTabletop, _scene(0.5))
+    return replace(_pushing("yumi-mujoco", 0.5), build=build, packages=PACKAGES)
+
+
 def yumi_rehearsal() -> Setup:
     """What stands in for a real ABB YuMi: slower than the simulation, and stopped early with f = -1.9 m."""
     x, y = ((low - MARGIN, high + MARGIN) for low, high in (TABLE_X, TABLE_Y))
@@ -65,15 +77,7 @@ def yumi_rehearsal() -> Setup:
 
 def _pushing(name: str, share: float) -> Setup:
     """The same with joint speeds up to another share of the arm's own."""
-    speeds = tuple(share * speed for speed in JOINT_SPEEDS)
-    model = TabletopModel(
-        arm=ARM,
-        drive=SpeedDrive(speeds, MOTOR_FORCE),
-        cylinders=tuple(CylinderModel(radius=0.05, height=0.22, start=at, nominal=ROLL) for at in STARTS),
-        control_step=CONTROL_STEP,
-        solver_iterations=50,
-        table=(TABLE_X, TABLE_Y),
-    )
+    model = _scene(share)
     task = StablePush(
         starts=STARTS, direction=1.0, table_x=TABLE_X, table_y=TABLE_Y, margin=MARGIN, channel=len(ARM.joints)
     )
@@ -81,7 +85,7 @@ def _pushing(name: str, share: float) -> Setup:
         name=name,
         build=partial(Tabletop, model),
         controller=JointSpeedWaypoints(
-            waypoints=6, joints=ARM.joints, speed_limits=speeds, lower=LOWER, upper=UPPER
+            waypoints=6, joints=ARM.joints, speed_limits=model.drive.limits, lower=LOWER, upper=UPPER
         ),
         task=task,
         observation=model.observation(),
@@ -92,4 +96,17 @@ def _pushing(name: str, share: float) -> Setup:
         objective_limits=task.objective_limits,
         success=SUCCESS,
         broken=BROKEN,
+    )
+
+
+def _scene(share: float) -> TabletopModel:
+    """The model of the scene, with joint speeds up to a share of the arm's own."""
+    speeds = tuple(share * speed for speed in JOINT_SPEEDS)
+    return TabletopModel(
+        arm=ARM,
+        drive=SpeedDrive(speeds, MOTOR_FORCE),
+        cylinders=tuple(CylinderModel(radius=0.05, height=0.22, start=at, nominal=ROLL) for at in STARTS),
+        control_step=CONTROL_STEP,
+        solver_iterations=50,
+        table=(TABLE_X, TABLE_Y),
     )

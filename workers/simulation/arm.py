@@ -2,13 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import NamedTuple
-
-import pybullet_data
+from typing import NamedTuple, Protocol
 
 from workers.simulation.bullet import pybullet
-from workers.simulation.description import joint_indices, load_robot
+from workers.simulation.description import joint_indices, load_robot, robot_path
 from workers.simulation.world import World
 
 Vector = tuple[float, ...]
@@ -81,6 +78,20 @@ class ArmModel:
                 raise ValueError(f"home of {joint} must lie within [{low}, {high}] rad, got {start}")
 
 
+class ArmReadings(Protocol):
+    """What controllers read of an arm, whatever simulates it."""
+
+    @property
+    def state(self) -> ArmState:
+        """The arm as it is now."""
+
+    def jacobian(self) -> tuple[tuple[Vector, ...], tuple[Vector, ...]]:
+        """Linear and angular Jacobian of the hand's origin, 3 rows each; the first columns are the joints."""
+
+    def gravity_torque(self) -> Vector:
+        """Torques, in N·m, against gravity, Coriolis and centrifugal forces; the arm's joints come first."""
+
+
 class Arm:
     """An arm in a world, at its home pose after `reset`."""
 
@@ -100,9 +111,9 @@ class Arm:
         self.state = self._read()
 
     def _load(self, model: ArmModel) -> int:
-        path = Path(pybullet_data.getDataPath()) / model.urdf
         # Nobody looks: the meshes that are only seen would take 100 MB.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+        path = robot_path(model.urdf)
         return load_robot(path, self._client, basePosition=model.base, useFixedBase=True, flags=flags)
 
     def _configure(self) -> None:

@@ -9,10 +9,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import pybullet_data
+
 from workers.simulation.bullet import pybullet
 
 _OUTPUT = 1
 _PREFIX = re.compile(r"b3\w+\[[^\]]*\]:\s*")
+
+
+def robot_path(urdf: Path | str) -> Path:
+    """Where a robot's URDF file is: below the folder of robots that ships with PyBullet, or absolute."""
+    return Path(pybullet_data.getDataPath()) / urdf
 
 
 def load_robot(path: Path, client: int, **options: Any) -> int:

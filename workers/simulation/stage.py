@@ -6,10 +6,10 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 import numpy as np
-import pybullet_data
 from jaxtyping import UInt8, UInt16
 
 from workers.simulation.bullet import pybullet
+from workers.simulation.description import robot_path
 from workers.simulation.scenery import Camera
 from workers.simulation.server import Server
 from workers.simulation.shapes import Surface
@@ -60,8 +60,7 @@ class Scene(Server):
 
     def _load(self, urdf: Path | str) -> int:
         if isinstance(urdf, Path):
-            path = Path(pybullet_data.getDataPath()) / urdf
-            return pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self.client)
+            return pybullet.loadURDF(str(robot_path(urdf)), useFixedBase=True, physicsClientId=self.client)
         with NamedTemporaryFile("w", encoding="utf-8", suffix=".urdf") as file:  # Bullet reads files only
             file.write(urdf)
             file.flush()

@@ -70,6 +70,7 @@ def test_more_runs_and_methods_extend_a_comparison(compared, tracking_settings):
     ]
 
 
+@pytest.mark.slow
 def test_a_comparison_runs_under_the_gap_it_was_asked_for(compared, tmp_path):
     paper, wide = (table(compared("random", gap=gap, folder=tmp_path / gap)) for gap in ("paper", "wide"))
     assert [row["x"] for row in paper] == [row["x"] for row in wide]

@@ -58,6 +58,7 @@ def test_a_folder_that_cannot_be_written_is_refused_naming_it(compared, tmp_path
         compared("random", folder=tmp_path / "file" / "out")
 
 
+@pytest.mark.slow
 def test_runs_that_would_vanish_beside_longer_ones_are_refused(compared, capsys):
     out = compared("random", runs=1)
     whole = table(out)

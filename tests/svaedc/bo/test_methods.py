@@ -23,7 +23,9 @@ def best_of_run(name, seed, count=12):
     return history.f.max()
 
 
-@pytest.mark.parametrize("name", ["se", "matern", "svae"])
+@pytest.mark.parametrize(
+    "name", ["se", *(pytest.param(name, marks=pytest.mark.slow) for name in ("matern", "svae"))]
+)
 def test_optimisation_comes_closer_to_the_optimum_than_random_search(name):
     regret = {
         method: np.mean([1 - best_of_run(method, seed) for seed in range(4)]) for method in ("random", name)
