@@ -37,6 +37,7 @@ from workers.environments.gymnasium_world import (
     make_anew,
     name_of,
     nothing_to_apply,
+    packages_of,
     require_channels,
 )
 from workers.physics import PhysicsRanges
@@ -175,6 +176,7 @@ def gymnasium_setup(
         seconds = _control_step(world) if control_step is None else control_step
         _require_time(world, horizon)
         channels = bounded_channels(world, observation, action, horizon)
+        packages = packages_of(world)
     finally:
         world.close()
     return Setup(
@@ -199,6 +201,7 @@ def gymnasium_setup(
         gaps={**dict.fromkeys(("paper", "training", "wide"), ranges), **(gaps or {})},
         objective_limits=objective_limits,
         success=success,
+        packages=packages,
     )
 
 

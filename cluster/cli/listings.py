@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from cluster.listing import Listed
 
 
-def setups() -> None:
-    """List the setups: name, number of parameters and steps, what it is, and the package it comes from."""
+def list_setups() -> None:
+    """Print them."""
     from cluster.listing import listed_setups
 
     _show(listed_setups())

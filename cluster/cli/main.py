@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
-from cluster.cli import dataset, hardware
+from cluster.cli import dataset, hardware, setups
 from cluster.cli.check import check
 from cluster.cli.collect import collect
 from cluster.cli.compare import compare
 from cluster.cli.demo import demo
-from cluster.cli.listings import methods, robots, setups
+from cluster.cli.listings import methods, robots
 from cluster.cli.output import Reader, finish_writing, write_any_character
 from cluster.cli.render import render
 from cluster.cli.reproduce import reproduce
@@ -37,10 +37,11 @@ app = typer.Typer(
 )
 
 
-for _command in (demo, check, collect, train, compare, ui, render, reproduce, setups, methods, robots):
+for _command in (demo, check, collect, train, compare, ui, render, reproduce, methods, robots):
     app.command()(_command)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(hardware.app, name="hardware")
+app.add_typer(setups.app, name="setups")
 
 
 _COMPLETION = {

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 from cluster.errors import UserError
 from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
+from workers.setups import load
+from workers.setups.declared import changes, declaration
 
 
 class TrainedModel(NamedTuple):
@@ -38,22 +40,42 @@ def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
 
     Args:
         path: folder that `svaedc train` left, or the checkpoint in it.
-        setup: that it must have been trained on.
+        setup: that it must have been trained on, or one with the same controllers and channels: the same
+            robot in another engine.
         twin: another setup that will do as well; "" for none.
 
     Returns:
         The model, its file and its metadata.
 
     Raises:
-        UserError: it cannot be read, or was trained on another setup.
+        UserError: it cannot be read, or was trained on a setup that differs in controllers or channels.
     """
     found = load_model(path)
-    trained_on = twin if twin and found.metadata.get("setup") == twin else setup
-    try:
-        checkpoint.require(found.path, found.metadata, {"setup": trained_on})
-    except ValueError as error:
-        raise UserError(f"cannot use the model: {error}") from error
+    trained_on = str(found.metadata.get("setup"))
+    if trained_on not in (setup, twin):
+        differing = _differing(trained_on, setup)
+        if differing:
+            raise UserError(
+                f"cannot use the model: {found.path} was made for setup {trained_on!r}, not {setup!r}, which "
+                f"differs in {differing}; name another checkpoint or train one"
+            )
     return found
+
+
+def _differing(one: str, other: str) -> str:
+    """In what two setups differ of what a model knows; "" where it can serve both."""
+    try:
+        told, asked = (
+            {name: value for name, value in declaration(load(setup)).items() if name in _KNOWN}
+            for setup in (one, other)
+        )
+    except LookupError as error:
+        return f"all that is known: {error.args[0]}"
+    return "; ".join(map(str, changes(told, asked)))
+
+
+_KNOWN = ("parameters", "observation", "horizon", "control_step")
+"""A model has learnt what these mean."""
 
 
 @cache

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import gymnasium
 import numpy as np
@@ -194,11 +194,17 @@ def _layers(world: World) -> Iterator[World]:
 
 def _let_explode(world: World) -> None:
     """MuJoCo sets a simulation that explodes back to its start and goes on: keep it from that."""
-    model: Any = getattr(world.unwrapped, "model", None)
-    if type(model).__module__.partition(".")[0] == "mujoco":
+    if "mujoco" in packages_of(world):
         from workers.mujoco.library import keep_exploded
 
-        keep_exploded(model)
+        keep_exploded(cast(Any, world.unwrapped).model)
+
+
+def packages_of(world: World) -> tuple[str, ...]:
+    """The packages whose versions decide what it does: Gymnasium, and the engine where that is MuJoCo."""
+    model: Any = getattr(world.unwrapped, "model", None)
+    is_mujoco = type(model).__module__.partition(".")[0] == "mujoco"
+    return ("gymnasium", "mujoco") if is_mujoco else ("gymnasium",)
 
 
 def name_of(world: World) -> str:

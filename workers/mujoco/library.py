@@ -8,7 +8,7 @@ PACKAGES = ("mujoco",)
 REMEDY = "install the extra: pip install 'svaedc[mujoco]'"
 
 
-class MissingExtraError(ImportError):
+class MissingExtraError(LookupError):
     """A package is missing that is no requirement of every installation; the message names its extra."""
 
 

@@ -62,6 +62,7 @@ class Hexapod:
         self._plane = world.plane
         self._model = model
         self.body: int = self._load(model.urdf)
+        world.touch_ground_only(self.body)
         found = self._joint_names()
         if found != list(model.joints):
             odd = next(name for name in (*model.joints, *found) if (name in found) != (name in model.joints))

@@ -9,6 +9,7 @@ from workers.simulation.server import Server
 GRAVITY = -9.81  # m/s²
 _STATIC = (2, -3)  # Bullet's own collision group and mask of fixed bases
 _DYNAMIC = (1, -1)  # and of everything else
+_GROUND_ONLY = (1, 2)
 _NOTHING = (0, 0)
 
 
@@ -39,6 +40,7 @@ class World(Server):
             self.plane, -1, lateralFriction=1.0, restitution=1.0, physicsClientId=self.client
         )
         self._intangible: set[tuple[int, int]] = set()
+        self._ground_only: set[int] = set()
         self._filters: dict[tuple[int, int], tuple[int, int]] = {}
 
     def step(self) -> None:
@@ -53,6 +55,16 @@ class World(Server):
             links: their indices; −1 is the base.
         """
         self._intangible.update((body, link) for link in links)
+
+    def touch_ground_only(self, body: int) -> None:
+        """Let the links of a body touch fixed bodies and nothing else, from the next `forget_contacts` on.
+
+        Bullet lets the links of one body pass through each other anyway, but first finds out which are near.
+
+        Args:
+            body: with all its links.
+        """
+        self._ground_only.add(body)
 
     def forget_contacts(self) -> None:
         """Destroy every contact pair, so that the next episode starts like the first of a fresh world.
@@ -79,5 +91,7 @@ class World(Server):
         pybullet.setCollisionFilterGroupMask(body, link, *group_and_mask, physicsClientId=self.client)
 
     def _default_filter(self, body: int, link: int) -> tuple[int, int]:
+        if body in self._ground_only:
+            return _GROUND_ONLY
         mass = pybullet.getDynamicsInfo(body, -1, physicsClientId=self.client)[0]
         return _STATIC if link == -1 and math.isclose(mass, 0.0) else _DYNAMIC

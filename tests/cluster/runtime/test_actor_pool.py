@@ -251,11 +251,11 @@ def test_a_replacement_that_cannot_start_yet_costs_no_attempt(tmp_path, capsys):
 
 
 def test_replacements_that_never_start_end_the_work_with_their_reason(tmp_path):
-    limits = Limits(in_flight=1, attempts=2, seconds=60.0, start_seconds=4.0)
+    limits = Limits(in_flight=1, attempts=2, seconds=60.0, start_seconds=10.0)
     actor = ray.remote(Fragile).options(num_cpus=1)
     (tmp_path / "for ever").touch()
     with (
-        pytest.raises(UserError, match="could start within 4 s: OSError: the folder is away"),
+        pytest.raises(UserError, match="could start within 10 s: OSError: the folder is away"),
         pool_of(lambda: actor.remote(tmp_path), 1, limits) as pool,
     ):
         list(pool.run(["dies-1", "works-0"]))

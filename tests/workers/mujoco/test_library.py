@@ -18,6 +18,6 @@ def test_setups_without_mujoco_say_which_extra_they_need(monkeypatch, name):
     for module in [each for each in sys.modules if "mujoco" in each]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(ImportError, match=r"pip install 'svaedc\[mujoco\]'"):
+    with pytest.raises(LookupError, match=r"pip install 'svaedc\[mujoco\]'"):
         setups.load(name)
     assert setups.load(name.removesuffix("-mujoco")).packages == ()

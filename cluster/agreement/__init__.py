@@ -1,0 +1,1 @@
+"""`svaedc setups compare`: how far two simulations of the same controllers agree."""
