@@ -1,8 +1,10 @@
 """Training beside other work: updates per second of `svaedc train`, quiet and with every core taken.
 
-Collects 512 Franka episodes, then trains on them four times: with one thread, the default, and with all of
-them, each on a quiet machine and beside as many busy loops as there are cores. A fair share of one thread
-among n loops on n cores is n / (n + 1); the ratios say what is left of it. `--seconds N` measures longer.
+First a plain loop is counted, quiet and beside as many busy loops as there are cores: what it keeps is a fair
+share on this machine, n / (n + 1) of n cores if it were ideal. Then 512 Franka episodes are collected, and
+trained on twice: with one thread, the default, and with all of them. Each training is measured on a quiet
+machine first; then the busy loops are started beside it. The ratios say what is left of the quiet speed.
+`--seconds N` measures longer.
 """
 
 import argparse
@@ -30,22 +32,38 @@ def busy(loops):
             process.wait()
 
 
-def rate(folder, threads, seconds):
-    """Updates per second between the first progress line and the last within so many seconds of it."""
+def plain_loop(seconds):
+    """Iterations per second of a process that does nothing but count, in steps that are no system calls."""
+    code = (
+        "import sys, time\n"
+        "end, count = time.monotonic() + float(sys.argv[1]), 0\n"
+        "while time.monotonic() < end:\n"
+        "    for _ in range(100_000):\n"
+        "        count += 1\n"
+        "print(count)"
+    )
+    return float(subprocess.check_output([sys.executable, "-c", code, str(seconds)], text=True)) / seconds
+
+
+def rates(folder, threads, seconds, cores):
+    """Updates per second, quiet and beside busy loops, from one progress line to a later one."""
     model = Path(tempfile.mkdtemp(dir=folder))
     command = [SVAEDC, "train", "--dataset", str(folder / "data"), "--model", str(model / "model")]
     command += ["--set", "train.updates=100000", *threads]
     process = subprocess.Popen(command, cwd=model, stderr=subprocess.PIPE, text=True)
-    seen = []
-    for line in process.stderr:
-        found = COUNT.search(line)
-        if found:
-            seen.append((time.monotonic(), int(found[1])))
-        if seen and seen[-1][0] - seen[0][0] > seconds:
-            break
+    lines = ((time.monotonic(), COUNT.search(line)) for line in process.stderr)
+    counts = ((moment, int(found[1])) for moment, found in lines if found)
+    quiet = _rate(counts, seconds)
+    with busy(cores):
+        beside = _rate(counts, seconds)
     process.terminate()
     process.communicate()
-    (begin, first), (end, last) = seen[0], seen[-1]
+    return quiet, beside
+
+
+def _rate(counts, seconds):
+    begin, first = next(counts)
+    end, last = next((moment, count) for moment, count in counts if moment - begin > seconds)
     return (last - first) / (end - begin)
 
 
@@ -67,17 +85,18 @@ def main():
             str(folder / "data"),
         ]
         subprocess.run(collect, check=True, cwd=folder, stderr=subprocess.DEVNULL)
+        alone = plain_loop(seconds / 4)
+        with busy(cores):
+            share = plain_loop(seconds / 4) / alone
+        print(f"a plain loop beside {cores} busy loops keeps {share:.2f} of its speed", flush=True)
         for label, threads in (
             ("one thread, the default", []),
             ("all threads", ["--set", "train.threads=all"]),
         ):
-            quiet = rate(folder, threads, seconds)
-            with busy(cores):
-                beside = rate(folder, threads, seconds)
-            share = beside / quiet
+            quiet, beside = rates(folder, threads, seconds, cores)
             print(
-                f"{label}: {quiet:.2f} updates/s quiet, {beside:.2f} beside {cores} busy loops: {share:.2f} "
-                f"(fair share of one thread {cores / (cores + 1):.2f})",
+                f"{label}: {quiet:.2f} updates/s quiet, {beside:.2f} beside {cores} busy loops: "
+                f"{beside / quiet:.2f}",
                 flush=True,
             )
 

@@ -46,7 +46,7 @@ def draw_worst(
     for number, pair in enumerate(pairs, 1):
         path = out / f"worst-{number}.gif"
         sides = [
-            _drawn(setup, name, episode)
+            _pictures_of(setup, name, episode)
             for setup, name, episode in zip(setups, names, (pair.one, pair.other), strict=True)
         ]
         with replacing(path) as unfinished:
@@ -55,7 +55,7 @@ def draw_worst(
     return written
 
 
-def _drawn(setup: Setup, name: str, episode: Episode) -> Iterator[Picture]:
+def _pictures_of(setup: Setup, name: str, episode: Episode) -> Iterator[Picture]:
     moments = clip(setup, episode, usual_speed(setup), _RATE)
     title = f"{name}: f {episode.f:+.3g}, y {episode.y:.2f}"
     for picture in pictures(setup, episode, moments, _SIZE, ""):

@@ -49,7 +49,7 @@ def compare_setups(
         require_comparable(one, other, gap)
     names = (one.name, f"{other.name} ({gap})" if one.name == other.name else other.name)
     with ProgressLine("controllers", count, 0) as progress:
-        pairs = list(_counted(twins(one, other, seed, count, gap), progress))
+        pairs = list(_with_progress(twins(one, other, seed, count, gap), progress))
     usable = [pair for pair in pairs if not {pair.one.stop, pair.other.stop} & UNUSABLE]
     if len(usable) < FEWEST:
         raise UserError(
@@ -80,7 +80,7 @@ def compare_setups(
     return document
 
 
-def _counted(pairs: Iterator[Twins], progress: ProgressLine) -> Iterator[Twins]:
+def _with_progress(pairs: Iterator[Twins], progress: ProgressLine) -> Iterator[Twins]:
     for pair in pairs:
         progress.advance(1, "")
         yield pair

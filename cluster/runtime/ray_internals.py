@@ -18,11 +18,17 @@ from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ig
 
 from cluster.home import is_writable
 
-SETTINGS: Mapping[str, Any] = {
+PRIORITY: Mapping[str, Any] = {
+    # Ray starts workers at niceness 15: beside other work on every core they get a thirtieth of their share.
+    "worker_niceness": 0,
+}
+"""Every cluster that is started here has it."""
+
+UNWATCHED: Mapping[str, Any] = {
     # Counters that every process exports every ten seconds, for the dashboard and Prometheus.
     "enable_metrics_collection": False,
 }
-"""All of Ray's processes have these. The user's own, RAY_<name> in the environment, come first."""
+"""Clusters without a dashboard have these as well."""
 
 AGENT: Mapping[str, str] = {
     # The agent, without which no raylet lives, looks at every process so often; by default every 5 s.
@@ -31,9 +37,17 @@ AGENT: Mapping[str, str] = {
 """The agent has these, and knows them by its environment only."""
 
 
-def settings() -> dict[str, Any]:
-    """Settings that Ray is to be started with, but for those that the user has chosen."""
-    return {name: value for name, value in SETTINGS.items() if f"RAY_{name}" not in os.environ}
+def settings(*wanted: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of all of Ray's processes, but for those that the user has chosen.
+
+    Args:
+        wanted: the settings, by their names in Ray.
+
+    Returns:
+        Those for which there is no RAY_<name> in the environment.
+    """
+    each = {name: value for settings in wanted for name, value in settings.items()}
+    return {name: value for name, value in each.items() if f"RAY_{name}" not in os.environ}
 
 
 @contextmanager

@@ -128,10 +128,12 @@ def _start(settings: RaySettings, parts: tuple[Part, ...]) -> None:
 def _start_parts(settings: RaySettings, parts: tuple[Part, ...]) -> None:
     """Starts a cluster with these parts only."""
     if "dashboard" in parts:
-        _initialize(settings, include_dashboard=True)
+        chosen = ray_internals.settings(ray_internals.PRIORITY)
+        _initialize(settings, include_dashboard=True, _system_config=chosen)
         return
     with ray_internals.quiet_agent():
-        _initialize(settings, include_dashboard=False, _system_config=ray_internals.settings())
+        chosen = ray_internals.settings(ray_internals.PRIORITY, ray_internals.UNWATCHED)
+        _initialize(settings, include_dashboard=False, _system_config=chosen)
     ray_internals.end_spectators()
 
 

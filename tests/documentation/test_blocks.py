@@ -17,6 +17,7 @@ NOT_RUN = {
     "docs/how-to/check.md": 1,
     "docs/how-to/clusters.md": 1,
     "docs/how-to/drivers.md": 3,
+    "docs/how-to/engines.md": 2,
     "docs/how-to/export.md": 1,
     "docs/how-to/gymnasium.md": 4,
     "docs/how-to/object-stores.md": 1,

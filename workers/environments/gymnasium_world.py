@@ -195,7 +195,7 @@ def _layers(world: World) -> Iterator[World]:
 def _let_explode(world: World) -> None:
     """MuJoCo sets a simulation that explodes back to its start and goes on: keep it from that."""
     if "mujoco" in packages_of(world):
-        from workers.mujoco.library import keep_exploded
+        from workers.mujoco.explosions import keep_exploded
 
         keep_exploded(cast(Any, world.unwrapped).model)
 

@@ -12,12 +12,9 @@ from workers.environments.environment import Command, Environment, Observed
 from workers.environments.tabletop import first_two_axes
 from workers.mujoco import scene
 from workers.mujoco.description import compile_scene, read_robot
-from workers.mujoco.library import PACKAGES, mujoco
 from workers.mujoco.simulation import Simulation
 from workers.physics import Physics
 from workers.plans import JointPlan, PlannedCommand
-
-__all__ = ["PACKAGES", "MujocoDaisy"]
 
 MOTOR_DAMPING: Final = 20.0
 """kd of the motors, in N·m·s/rad. Bullet's motor is a constraint: in each of its steps it removes a share of
@@ -110,8 +107,7 @@ class MujocoDaisy(Environment):
 def _furnish(spec: Any) -> None:
     """Put the robot over the ground, free, with a motor at every joint."""
     parts, bodies = [geom.name for geom in spec.geoms], [body.name for body in spec.bodies]
-    spec.option.timestep = CONTROL_STEP / SUBSTEPS
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    scene.set_time_step(spec, CONTROL_STEP / SUBSTEPS)
     root = spec.body(_BODY)
     root.pos = (0.0, 0.0, ROBOT.height)
     root.add_freejoint(name=_BODY)

@@ -12,12 +12,9 @@ from workers.environments.tabletop import ArmScene, TabletopModel
 from workers.mujoco import scene
 from workers.mujoco.arm import MujocoArm, arm_scene, hand_link, moving_links, solid_links
 from workers.mujoco.description import compile_scene
-from workers.mujoco.library import PACKAGES, mujoco
 from workers.mujoco.simulation import Simulation
 from workers.physics import Physics
 from workers.plans import HandPlan, JointPlan, PlannedCommand
-
-__all__ = ["PACKAGES", "MujocoTabletop"]
 
 SPEED_GAIN: Final = 30.0
 """A motor that seeks a speed has so many N·m per rad/s it is wrong; with 2,000 the servos chatter."""
@@ -55,8 +52,7 @@ class MujocoTabletop(ArmScene):
     def _furnish(self, spec: Any) -> None:
         """Add motors, the ground and the objects to the scene of the arm."""
         model = self._model
-        spec.option.timestep = model.control_step
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        scene.set_time_step(spec, model.control_step)
         for joint in model.arm.joints:
             if isinstance(model.drive, SpeedDrive):
                 scene.float_links(spec, model.arm.joints)

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from workers.mujoco.description import child_links, read_robot, require_joints
-from workers.mujoco.library import mujoco
 from workers.mujoco.scene import set_joint
 from workers.mujoco.simulation import Simulation
 from workers.simulation.arm import ArmModel, ArmReadings, ArmState, Vector

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from workers.mujoco.library import mujoco
+import mujoco
 
 _PACKAGE = "package://"
 

@@ -7,18 +7,16 @@ installed. They call MuJoCo's public C functions by name.
 from pathlib import Path
 from typing import Any, no_type_check
 
+import llvmlite.binding
+import mujoco
+import numba
 import numpy as np
-
-from workers.mujoco.library import import_extra, mujoco
-
-numba = import_extra("numba")
-llvm = import_extra("llvmlite.binding")
 
 _XBODY = 2  # mjOBJ_XBODY: a body's own frame
 _types = numba.types
 _ADDRESS, _INT = _types.intp, _types.int32
 
-llvm.load_library_permanently(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))))
+llvmlite.binding.load_library_permanently(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))))
 
 
 def _function(name: str, *arguments: Any) -> Any:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from workers.mujoco.library import mujoco
+import mujoco
 
 GROUND = "ground"
 LINK_FRICTION = 0.5
@@ -19,6 +19,12 @@ SPINNING_FRICTION = 1e-5
 CONTACT_SECONDS = 0.02
 """It is MuJoCo's own time constant of contacts."""
 _ROLLING, _SLIDING = 6, 3  # directions in which a contact resists
+
+
+def set_time_step(spec: Any, seconds: float) -> None:
+    """Set the engine's step; velocities are integrated implicitly, which stiff motors need."""
+    spec.option.timestep = seconds
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
 def add_ground(spec: Any) -> None:

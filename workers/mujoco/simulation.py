@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from workers.mujoco import episodes
-from workers.mujoco.library import keep_exploded, mujoco
+from workers.mujoco.explosions import keep_exploded
 from workers.plans import HandPlan, JointPlan
 
 _QUATERNION = (1, 2, 3, 0)  # x, y, z, w of MuJoCo's w, x, y, z

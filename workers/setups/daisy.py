@@ -17,6 +17,8 @@ from workers.environments.daisy import (
     DaisyModel,
     observation,
 )
+from workers.environments.environment import Environment
+from workers.mujoco import extra
 from workers.physics import PhysicsRanges, around
 from workers.setups.setup import Setup
 from workers.tasks.stop import WalkGuard
@@ -80,10 +82,15 @@ def daisy_11d_mujoco() -> Setup:
 
 
 def _in_mujoco(setup: Setup, reach: tuple[float, float, float]) -> Setup:
-    from workers.environments.mujoco_daisy import PACKAGES, MujocoDaisy
+    extra.require_installed()
+    build = partial(_open_in_mujoco, DaisyModel(speeds=UNLIMITED, reach=reach))
+    return replace(setup, name=f"{setup.name}-mujoco", build=build, packages=extra.PACKAGES)
 
-    build = partial(MujocoDaisy, DaisyModel(speeds=UNLIMITED, reach=reach))
-    return replace(setup, name=f"{setup.name}-mujoco", build=build, packages=PACKAGES)
+
+def _open_in_mujoco(model: DaisyModel) -> Environment:
+    from workers.environments.mujoco_daisy import MujocoDaisy  # it takes a second
+
+    return MujocoDaisy(model)
 
 
 def daisy_11d_rehearsal() -> Setup:

@@ -10,7 +10,9 @@ from math import pi
 
 from workers.controllers.end_effector import EndEffectorWaypoints, WaypointRanges
 from workers.environments.drive import TorqueDrive
+from workers.environments.environment import Environment
 from workers.environments.tabletop import CylinderModel, Tabletop, TabletopModel
+from workers.mujoco import extra
 from workers.setups.setup import Setup
 from workers.simulation.arm import UNLIMITED, ArmModel
 from workers.tasks.stable_push import StablePush
@@ -72,10 +74,14 @@ def franka_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    from workers.environments.mujoco_tabletop import PACKAGES, MujocoTabletop
+    extra.require_installed()
+    return replace(_pushing("franka-mujoco", MODEL), build=_open_in_mujoco, packages=extra.PACKAGES)
 
-    build = partial(MujocoTabletop, MODEL)
-    return replace(_pushing("franka-mujoco", MODEL), build=build, packages=PACKAGES)
+
+def _open_in_mujoco() -> Environment:
+    from workers.environments.mujoco_tabletop import MujocoTabletop  # it takes a second
+
+    return MujocoTabletop(MODEL)
 
 
 def franka_rehearsal() -> Setup:

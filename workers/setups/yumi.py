@@ -9,7 +9,9 @@ from pathlib import Path
 
 from workers.controllers.joint_speed import JointSpeedWaypoints
 from workers.environments.drive import SpeedDrive
+from workers.environments.environment import Environment
 from workers.environments.tabletop import CylinderModel, Tabletop, TabletopModel
+from workers.mujoco import extra
 from workers.setups.setup import Setup
 from workers.simulation.arm import UNLIMITED, ArmModel
 from workers.tasks.stable_push import StablePush
@@ -45,6 +47,8 @@ LOWER = (0.8, -1.5, -2.353, -1.724, -4.049, -1.229, -3.197)
 UPPER = (2.353, 0.607, 1.0, 0.6, 4.049, 1.927, 3.197)
 
 
+SHARE = 0.5
+"""The simulation uses this share of the arm's joint speeds."""
 REHEARSAL_SHARE = 0.2
 """The stand-in has this share of the arm's joint speeds, a reading of the paper's "1/5". The authors' code
 notes 0.1 for the robot, at which next to nothing is pushed (docs/results/yumi.md)."""
@@ -54,7 +58,7 @@ LOWEST_HAND = 0.09
 
 def yumi() -> Setup:
     """The setup `yumi`: 48-D, 1000 steps of 2 ms, f in [-1.9, 1.55] m."""
-    return _pushing("yumi", 0.5)
+    return _pushing("yumi", SHARE)
 
 
 def yumi_mujoco() -> Setup:
@@ -63,10 +67,14 @@ def yumi_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    from workers.environments.mujoco_tabletop import PACKAGES, MujocoTabletop
+    extra.require_installed()
+    return replace(_pushing("yumi-mujoco", SHARE), build=_open_in_mujoco, packages=extra.PACKAGES)
 
-    build = partial(MujocoTabletop, _scene(0.5))
-    return replace(_pushing("yumi-mujoco", 0.5), build=build, packages=PACKAGES)
+
+def _open_in_mujoco() -> Environment:
+    from workers.environments.mujoco_tabletop import MujocoTabletop  # it takes a second
+
+    return MujocoTabletop(_scene(SHARE))
 
 
 def yumi_rehearsal() -> Setup:

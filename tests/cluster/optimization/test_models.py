@@ -29,12 +29,29 @@ def test_a_folder_and_the_file_in_it_name_the_same_frozen_model(folder):
     assert not any(parameter.requires_grad for parameter in found[0].model.parameters())
 
 
-def test_a_model_of_another_setup_is_refused_unless_that_is_the_twin(folder):
-    with pytest.raises(UserError, match="made for setup 'franka-rehearsal', not 'franka'"):
+@pytest.mark.parametrize("setup", ["franka-rehearsal", "franka", "franka-mujoco"])
+def test_a_model_serves_every_setup_with_the_same_controllers_and_channels(folder, setup):
+    if setup.endswith("mujoco"):
+        pytest.importorskip("mujoco")
+    assert trained_model(folder, setup).metadata["setup"] == "franka-rehearsal"
+
+
+def test_a_model_of_other_channels_is_refused_with_what_differs_unless_that_is_the_twin(folder):
+    with pytest.raises(
+        UserError,
+        match=r"made for setup 'franka-rehearsal', not 'yumi', which differs in .*; horizon: 500 and",
+    ):
+        trained_model(folder, "yumi")
+    assert trained_model(folder, "yumi", twin="franka-rehearsal").path == folder / "model.pt"
+
+
+def test_a_model_of_a_setup_that_is_gone_serves_no_other(folder):
+    _, metadata = checkpoint.load(folder / "model.pt")
+    model = trained_model(folder, "franka").model
+    checkpoint.save(folder / "model.pt", model, {**metadata, "setup": "long_gone"})
+    with pytest.raises(UserError, match=r"made for setup 'long_gone', not 'franka'.*long_gone"):
         trained_model(folder, "franka")
-    assert trained_model(folder, "franka", twin="franka-rehearsal").path == folder / "model.pt"
-    with pytest.raises(UserError, match="made for setup 'franka-rehearsal', not 'franka'"):
-        trained_model(folder, "franka", twin="yumi")
+    assert trained_model(folder, "long_gone").metadata["setup"] == "long_gone"
 
 
 def test_a_model_that_several_runs_share_is_loaded_once(folder):

@@ -50,12 +50,13 @@ tell("environment", *(name for name in ("REPORTER_UPDATE_INTERVAL_MS",) if name 
 
 def test_what_the_user_has_chosen_is_left_alone(monkeypatch):
     monkeypatch.setenv("RAY_enable_metrics_collection", "1")
-    assert "enable_metrics_collection" not in ray_internals.settings()
+    monkeypatch.setenv("RAY_worker_niceness", "19")
+    assert ray_internals.settings(ray_internals.PRIORITY, ray_internals.UNWATCHED) == {}
 
 
 def test_metrics_are_off_unless_the_user_has_chosen(monkeypatch):
     monkeypatch.delenv("RAY_enable_metrics_collection", raising=False)
-    assert ray_internals.settings()["enable_metrics_collection"] is False
+    assert ray_internals.settings(ray_internals.UNWATCHED) == {"enable_metrics_collection": False}
 
 
 @pytest.mark.parametrize("before", [None, "1234"])

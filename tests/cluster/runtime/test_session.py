@@ -146,6 +146,18 @@ def test_a_local_cluster_offers_one_hardware_slot(ray_session):
     assert ray.cluster_resources()["hardware"] == 1
 
 
+def niceness():
+    return os.nice(0)
+
+
+def test_workers_have_the_same_share_of_a_busy_machine_as_their_driver(ray_session):
+    """Ray would start them at 15, which leaves a thirtieth beside other work on every core."""
+    import ray
+
+    assert ray_session.is_local
+    assert ray.get(ray.remote(niceness).remote()) == os.nice(0)
+
+
 def test_a_local_cluster_is_reachable_from_this_machine_only(ray_session):
     port = int(ray_session.address.rpartition(":")[2])
     with socket.socket() as inside:

@@ -2,12 +2,12 @@
 
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
 from workers.mujoco import scene
 from workers.mujoco.description import compile_scene
-from workers.mujoco.library import mujoco
 from workers.mujoco.simulation import Simulation
 
 
