@@ -22,7 +22,12 @@ _ROLLING, _SLIDING = 6, 3  # directions in which a contact resists
 
 
 def set_time_step(spec: Any, seconds: float) -> None:
-    """Set the engine's step; velocities are integrated implicitly, which stiff motors need."""
+    """Set the engine's step; velocities are integrated implicitly, which stiff motors need.
+
+    Args:
+        spec: the scene.
+        seconds: of a step.
+    """
     spec.option.timestep = seconds
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
