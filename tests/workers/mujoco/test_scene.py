@@ -45,7 +45,8 @@ def test_damping_ratio_is_that_of_the_spring_with_that_bounce(restitution, ratio
     assert scene.damping_ratio(restitution) == pytest.approx(ratio)
 
 
-def test_a_reset_leaves_nothing_behind():
+def test_a_reset_leaves_nothing_behind(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
     spec = mujoco.MjSpec()
     scene.add_ground(spec)
     scene.add_cylinder(spec, "roll", radius=0.05, height=0.1, position=(0.2, 0.1))
@@ -61,3 +62,5 @@ def test_a_reset_leaves_nothing_behind():
     assert runs[0].tobytes() == runs[-1].tobytes()
     assert np.isnan(runs[1]).any()  # exploded, and MuJoCo did not set it back
     assert abs(runs[2][0] - 0.2) > 0.01
+    assert list(tmp_path.iterdir()) == []  # MuJoCo would leave MUJOCO_LOG.TXT
+    assert capfd.readouterr().err == ""
