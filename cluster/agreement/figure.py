@@ -34,11 +34,12 @@ def scatter(path: Path, names: tuple[str, str], f: Sides, y: Sides, document: Ma
         left, right = figure.subplots(1, 2)
         _panel(left, f, best, f"objective f, Spearman {spearman['objective']:.2f}", names)
         _panel(right, y, best, f"badness y, Spearman {spearman['badness']:.2f}", names)
-        left.legend(
+        figure.legend(
             handles=left.collections,
             labels=[f"{f.shape[1] - count} other controllers", f"the best {count} of {names[0]}"],
-            loc="lower right",
-            fontsize=8,
+            loc="outside lower center",
+            ncols=2,
+            frameon=False,
         )
         with replacing(path) as unfinished:
             figure.savefig(unfinished, format="png", dpi=120, metadata={"Software": None})
