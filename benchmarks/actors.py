@@ -25,7 +25,6 @@ from workers.dataset.folder import create, open_dataset
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 
-SETUP = "franka"
 PER_SHARD = 64
 WARM = 10**6
 """Index of the first episode, far from those that are timed, of which one shows that a process is ready."""
@@ -33,7 +32,8 @@ WARM = 10**6
 
 def rolled_out(folder: Path, shard: Shard) -> None:
     """The episodes of a shard of a dataset, thrown away."""
-    roll_out(setups.load(SETUP), open_dataset(folder), shard)
+    dataset = open_dataset(folder)
+    roll_out(setups.load(dataset.identity.setup), dataset, shard)
 
 
 def begin_plain(folder: Path, barrier: Barrier) -> None:
@@ -72,11 +72,12 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--setup", default="franka")
     parser.add_argument("--episodes", type=int, default=1024, help="of each turn")
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args()
-    identity = identity_of(setups.load(SETUP), seed=0, episodes_per_shard=PER_SHARD)
+    identity = identity_of(setups.load(arguments.setup), seed=0, episodes_per_shard=PER_SHARD)
     rates: dict[str, list[float]] = {"actors": [], "plain": []}
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores; {arguments.processes} processes each")
     with tempfile.TemporaryDirectory() as name:

@@ -40,7 +40,10 @@ def full_traceback(error: BaseException) -> str:
 
 
 def _own_frame(frames: Sequence[FrameSummary]) -> FrameSummary:
-    foreign = [frame for frame in frames if not _is_in(frame.filename, _PROJECT)]
+    made = ("<string>", "<stdin>")  # such as the __init__ of a dataclass
+    foreign = [
+        frame for frame in frames if not _is_in(frame.filename, _PROJECT) and frame.filename not in made[:1]
+    ]
     own = [frame for frame in foreign if not _is_in(frame.filename, _LIBRARIES)]
     if own:
         return own[-1]

@@ -16,7 +16,7 @@ from cluster.progress import ProgressLine, say
 from svaedc.analysis.agreement import Agreement, Fate, agreement, fate, summary_text, worst
 from svaedc.analysis.strict_json import json_values
 from svaedc.analysis.words import quantity
-from workers.collection.twins import Twins, require_comparable, twins
+from workers.collection.twins import SAME, Twins, require_comparable, twins
 from workers.episode import UNUSABLE, Episode, degrees
 from workers.setups import Setup
 
@@ -72,6 +72,8 @@ def compare_setups(
         }
     )
     say(summary_text(measures, best, names, successes))
+    if gap == SAME and one.physics != other.physics:
+        say(f"the ranges of their physics differ; both ran under those of {one.name} (--gap gives others)")
     if len(usable) < count:
         lost = " and ".join(f"{number} in {name}" for name, number in left_out.items())
         say(f"left out, for they diverged or failed: {lost}")

@@ -9,6 +9,9 @@ from workers.dataset.notes import notes
 from workers.dataset.repeats import irreducible
 from workers.dataset.statistics import Statistics, statistics
 
+HALF = 0.5
+"""With a larger share that no controller decides, the remedy is told."""
+
 
 def dataset_info(dataset: Dataset) -> dict[str, str]:
     """What a person reads of a dataset, by name.
@@ -67,7 +70,13 @@ def _irreducible(dataset: Dataset) -> dict[str, str]:
     if found is None:
         return {"irreducible": "unknown: fewer than two controllers have all their repeats"}
     low, high = found.xi
-    return {
+    rows = {
         "irreducible": f"{found.y:.2f} of the variance of y, {found.f:.2f} of that of f "
         f"({found.controllers} controllers); of xi, {low:.2f} to {high:.2f} of the error of its median"
     }
+    if max(found.y, found.f) > HALF:
+        rows["note"] = (
+            "half of what happens is decided by the hidden physics, whatever the controller: no model can "
+            "learn that; narrow the ranges of physics, or give the controller more feedback"
+        )
+    return rows

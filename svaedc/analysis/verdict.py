@@ -46,7 +46,8 @@ def verdict(summary: Summary) -> str:
         _PHRASES[judgement].format(enumeration([each.baseline for each in group]), least=least)
         for judgement, group in groupby(judged, key=lambda each: judge(summary, each))
     ]
-    return f"{first} ends highest after {trials}: {'; '.join(parts)}."
+    link = ":" if judge(summary, judged[0]) == "better" else ", but"
+    return f"{first} ends highest after {trials}{link} {'; '.join(parts)}."
 
 
 def sentences(summary: Summary, method: str) -> Iterator[str]:

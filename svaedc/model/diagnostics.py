@@ -18,7 +18,7 @@ posterior."""
 
 REMEDIES: Final = {  # in brackets the setting, as the section `train` names it
     "active_share": "lower the KL weight (kl_weight) or train longer (updates)",
-    "corr_y_rec": "raise the weight of y (weighting=balanced)",
+    "corr_y_rec": "more episodes or updates, or more weight of y (weighting=balanced)",
     "rec_norm": "raise the learning rate (learning_rate) or train longer (updates)",
     "gen_norm": "collect more episodes, or train longer (updates)",
 }

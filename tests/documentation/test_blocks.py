@@ -27,6 +27,7 @@ NOT_RUN = {
     "docs/how-to/train.md": 2,
     "docs/results/benchmarks.md": 1,
     "docs/results/daisy.md": 1,
+    "docs/results/engines.md": 2,
     "docs/results/franka.md": 3,
     "docs/results/quadratic.md": 1,
     "docs/results/reproduction.md": 1,

@@ -14,6 +14,11 @@ from workers.episode import DIVERGED, FAILED
 _JUMP = math.pi
 """An angle that changes by so much within a step, in rad, has come round to the other end of its range."""
 
+_ROOMY = 0.25
+"""A channel that uses less than this part of its bounds is named,"""
+_NAMED = 4
+"""and so many of them at most."""
+
 
 def check_episodes(sample: Sample) -> Iterator[Remark]:
     """Episodes come to their end."""
@@ -63,12 +68,37 @@ def check_worth(sample: Sample) -> Iterator[Remark]:
     for note in value_notes(sample.dataset, columns):
         yield Remark("worth", Severity.DOUBT, note)
     yield from _check_objective(sample)
+    yield from _tell_extents(sample)
+
+
+def _tell_extents(sample: Sample) -> Iterator[Remark]:
+    """Of the channels that use least of their bounds, the part that they use."""
+    xi = np.stack([episode.xi for episode in sample.usable.values()])
+    used = {
+        channel.name: float(np.ptp(xi[:, row])) / (channel.high - channel.low)
+        for row, channel in enumerate(sample.setup.observation)
+    }
+    idle = sorted((name for name in used if used[name] < _ROOMY), key=used.__getitem__)[:_NAMED]
+    if idle:
+        told = ", ".join(f"{name} {used[name]:.0%}" for name in idle)
+        yield Remark(
+            "worth",
+            Severity.FACT,
+            f"of their bounds use least: {told}; bounds twice as wide as what is seen are wide enough",
+        )
 
 
 def _check_objective(sample: Sample) -> Iterator[Remark]:
     f = np.array([episode.f for episode in sample.usable.values()])
     low, high = sample.setup.objective_limits
     outside = float(np.mean((f < low) | (f > high)))
+    yield Remark(
+        "worth",
+        Severity.FACT,
+        f"objectives reach from {f.min():.3g} to {f.max():.3g}: {(f > sample.setup.success).mean():.0%} of "
+        f"them above success, {sample.setup.success:g}, and {outside:.0%} outside objective_limits [{low:g}, "
+        f"{high:g}]; a few of a hundred should succeed, and hardly one lie outside",
+    )
     if outside > 0.5:
         yield Remark(
             "worth",

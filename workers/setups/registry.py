@@ -47,7 +47,10 @@ def find(name: str) -> Part:
         except LookupError as error:
             if _is_offered(name):
                 raise
-            raise LookupError(f"{error.args[0]}; nor is there a module of that name to import") from error
+            raise LookupError(
+                f"{error.args[0]}; nor is there a module of that name to import, neither here ({Path.cwd()}) "
+                "nor on PYTHONPATH"
+            ) from error
     return plug_ins.module_part(name)
 
 

@@ -88,14 +88,15 @@ def test_the_least_runs_are_the_fewest_whose_smallest_p_passes_the_correction(ba
 def test_failed_trials_and_absent_runs_are_named_and_no_number_is_nan():
     found = summary({"ours": around(0.6), "se": [math.nan, *around(0.3)[1:]], "dead": [math.nan] * 10})
     assert verdict(found) == (
-        "ours ends highest after 1 trial: it cannot be compared with dead and se (runs without an objective)."
+        "ours ends highest after 1 trial, but it cannot be compared with dead and se "
+        "(runs without an objective)."
     )
     assert next(sentences(found, "ours")) == (
         "ours and dead cannot be compared: in a run of both, one has no objective."
     )
     rows = [Row("ours", 0, 0, 0.5, success=False), Row("se", 1, 0, 0.1, success=False)]
     apart = summarize(rows, Reporting(initial=0), np.random.default_rng(0))
-    assert verdict(apart) == "ours ends highest after 1 trial: it has no whole run in common with se."
+    assert verdict(apart) == "ours ends highest after 1 trial, but it has no whole run in common with se."
 
 
 def test_without_an_objective_another_method_or_a_difference_there_is_no_winner():

@@ -150,7 +150,10 @@ def test_weights_that_are_not_finite_are_a_collapse(model, halves):
         ({"active_share": 0.2}, "active_share is 0.20; lower the KL weight"),
         ({"rec_norm": 1.0}, "rec_norm is 1.00; raise the learning rate"),
         ({"gen_norm": 1.1}, "gen_norm is 1.10; collect more episodes"),
-        ({"corr_y_rec": 0.1}, "corr_y_rec is 0.10; raise the weight of y (weighting=balanced)"),
+        (
+            {"corr_y_rec": 0.1},
+            "corr_y_rec is 0.10; more episodes or updates, or more weight of y",
+        ),
     ],
 )
 def test_a_collapse_is_named_with_a_remedy(change, remedy):

@@ -1,5 +1,7 @@
 """Mistakes planted in a sound robot: each is found, by a line that names the remedy."""
 
+import re
+
 import pytest
 
 from workers.conformance.remark import Severity
@@ -103,10 +105,18 @@ def findings(setup):
         return [finding for check in CHECKS for finding in find(check, looked_at)]
 
 
-def test_of_a_sound_robot_only_the_cost_is_said(own_robot):
-    found = findings(own_robot())
-    assert [(finding.check, finding.severity) for finding in found] == [("cost", Severity.FACT)]
-    assert "an episode, so 500,000 take" in found[0].text
+def test_of_a_sound_robot_only_facts_are_said(own_robot):
+    worth, cost = findings(own_robot())
+    assert {each.severity for each in (worth, cost)} == {Severity.FACT}
+    assert re.search(r"from .* to .*: \d+% of them above success, 0\.5, and 2% outside", worth.text)
+    assert "an episode, so 500,000 take" in cost.text
+
+
+def test_channels_that_use_little_of_their_bounds_are_named(own_robot):
+    found = findings(own_robot(('"m", -5.0, 5.0)', '"m", -50.0, 50.0)'), name="roomy_glider"))
+    told = [each for each in found if "bounds use least" in each.text]
+    assert [each.severity for each in told] == [Severity.FACT]
+    assert re.search(r"least: position \d%", told[0].text)
 
 
 @pytest.mark.parametrize("mistake", PLANTED)
