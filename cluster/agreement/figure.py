@@ -26,14 +26,17 @@ def scatter(path: Path, names: tuple[str, str], f: Sides, y: Sides, document: Ma
         y: badness in both, [2, controllers].
         document: of the agreement; its Spearman correlations and its best are shown.
     """
-    spearman = {each["name"]: each["spearman"] for each in document["measures"]}
+    spearman = {
+        each["name"]: "none" if each["spearman"] is None else f"{each['spearman']:.2f}"
+        for each in document["measures"]
+    }
     count = document["best"]["count"]
     best = np.argsort(-f[0], kind="stable")[:count]
     with mpl.rc_context({"axes.spines.top": False, "axes.spines.right": False, "font.size": 9}):
         figure = Figure(figsize=(8.4, 4.4), layout="constrained")
         left, right = figure.subplots(1, 2)
-        _panel(left, f, best, f"objective f, Spearman {spearman['objective']:.2f}", names)
-        _panel(right, y, best, f"badness y, Spearman {spearman['badness']:.2f}", names)
+        _panel(left, f, best, f"objective f, Spearman {spearman['objective']}", names)
+        _panel(right, y, best, f"badness y, Spearman {spearman['badness']}", names)
         figure.legend(
             handles=left.collections,
             labels=[f"{f.shape[1] - count} other controllers", f"the best {count} of {names[0]}"],
