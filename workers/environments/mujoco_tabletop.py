@@ -55,10 +55,11 @@ class MujocoTabletop(ArmScene):
         scene.set_time_step(spec, model.control_step)
         for joint in model.arm.joints:
             if isinstance(model.drive, SpeedDrive):
-                scene.float_links(spec, model.arm.joints)
                 scene.add_servo(spec, joint, stiffness=0.0, damping=SPEED_GAIN, torque=model.drive.force)
             else:
                 scene.add_torque_motor(spec, joint)
+        if isinstance(model.drive, SpeedDrive):
+            scene.float_links(spec, model.arm.joints[0])
         moving = moving_links(spec, model.arm)
         scene.add_ground(spec)
         for link in moving:

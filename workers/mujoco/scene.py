@@ -168,17 +168,16 @@ def set_joint(spec: Any, name: str, *, limits: tuple[float, float], damping: flo
     joint.damping = (damping, 0.0, 0.0)
 
 
-def float_links(spec: Any, joints: Sequence[str]) -> None:
-    """Take the weight off the links that joints carry, as the controllers of real arms do.
+def float_links(spec: Any, joint: str) -> None:
+    """Take the weight off all that hangs on a joint, as the controllers of real arms do.
 
     Args:
         spec: the scene.
-        joints: names; all that hangs on them floats.
+        joint: name of it, an arm's first.
     """
-    for joint in joints:
-        link = spec.joint(joint).parent
-        for body in (link, *link.find_all("body")):
-            body.gravcomp = 1.0
+    link = spec.joint(joint).parent
+    for body in (link, *link.find_all("body")):
+        body.gravcomp = 1.0
 
 
 def set_mass(model: Any, body: str, mass: float, inertia: Sequence[float]) -> None:
