@@ -162,7 +162,7 @@ def test_runs_of_a_method_whose_code_has_changed_are_not_mixed_and_those_of_othe
     assert list(digests) == ["my_method:mine"]
 
 
-def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_path):
+def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_of_the_same_channels(tmp_path):
     on_franka, on_yumi = (untrained(tmp_path / name, setup=name) for name in ("franka", "yumi"))
     assert usable(on_franka, setups.load("franka-rehearsal"))[1] == "franka"
     assert usable(on_franka, setups.load("franka"))[1] == "franka"
@@ -170,8 +170,12 @@ def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_no_other(tmp_pa
     assert usable(own, setups.load("franka-rehearsal"))[1] == "franka-rehearsal"
     with pytest.raises(UserError, match="made for setup 'yumi', not 'franka-rehearsal'"):
         usable(on_yumi, setups.load("franka-rehearsal"))
-    with pytest.raises(UserError, match="made for setup 'franka-rehearsal', not 'franka'"):
-        usable(own, setups.load("franka"))
+    assert usable(own, setups.load("franka"))[1] == "franka-rehearsal"
+    slower = untrained(tmp_path / "slower", setup="yumi-rehearsal")
+    with pytest.raises(
+        UserError, match="made for setup 'yumi-rehearsal', not 'yumi', which differs in param"
+    ):
+        usable(slower, setups.load("yumi"))
 
 
 def test_more_slots_than_cpus_are_refused(compared):
