@@ -173,7 +173,7 @@ def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_of_the_same_cha
     assert usable(own, setups.load("franka"))[1] == "franka-rehearsal"
     slower = untrained(tmp_path / "slower", setup="yumi-rehearsal")
     with pytest.raises(
-        UserError, match="made for setup 'yumi-rehearsal', not 'yumi', which differs in param"
+        UserError, match="made for setup 'yumi-rehearsal', not 'yumi', which differs"
     ):
         usable(slower, setups.load("yumi"))
 
