@@ -172,9 +172,7 @@ def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_of_the_same_cha
         usable(on_yumi, setups.load("franka-rehearsal"))
     assert usable(own, setups.load("franka"))[1] == "franka-rehearsal"
     slower = untrained(tmp_path / "slower", setup="yumi-rehearsal")
-    with pytest.raises(
-        UserError, match="made for setup 'yumi-rehearsal', not 'yumi', which differs"
-    ):
+    with pytest.raises(UserError, match="made for setup 'yumi-rehearsal', not 'yumi', which differs"):
         usable(slower, setups.load("yumi"))
 
 
