@@ -13,7 +13,7 @@ from workers.collection.independence import difference
 from workers.conformance.remark import Remark, Severity
 from workers.conformance.sample import Sample
 from workers.environments.environment import Channel, Environment
-from workers.episode import UNUSABLE, Episode
+from workers.episode import FAILED, UNUSABLE, Episode
 from workers.gymnasium_environment import SetupEnvironment
 from workers.randomness import Stream, generator
 from workers.rollout import draw, rollout
@@ -117,9 +117,15 @@ def _are_alike(pair: Sequence[Episode]) -> bool:
 
 
 def check_gymnasium(sample: Sample) -> Iterator[Remark]:
-    """Gymnasium's own checker has nothing against it; what it raises breaks the check off, and is told."""
-    if sample.usable:
+    """Gymnasium's own checker has nothing against it; what it raises breaks the check off, and is told.
+
+    It takes random actions in this process, and so is kept from code that failed: that may hang, or end it.
+    """
+    if any(episode.stop == FAILED for episode in sample.episodes):
+        text = "not asked: its random actions might hang or end this process, as they did episodes"
+        yield Remark("gymnasium", Severity.FACT, text)
+    elif sample.usable:
         with warnings.catch_warnings(), closing(SetupEnvironment(sample.setup)) as environment:
             warnings.simplefilter("ignore")  # of bounds beyond [-1, 1] and of no registry, which are meant
+            environment.action_space.seed(sample.seed)
             check_env(environment, skip_render_check=True)
-    return iter(())
