@@ -16,7 +16,7 @@ from workers.attempts import TIMEOUT_SECONDS, Attempts, SafeRollouts
 from workers.episode import Episode, Failure
 from workers.physics import Physics
 from workers.setups import Setup, load
-from workers.setups.declared import changes, declaration
+from workers.setups.declared import changes, declaration, list_changes
 from workers.setups.user_bad import with_bad
 
 
@@ -86,7 +86,7 @@ def _require_as_named(setup: Setup) -> None:
     if own != named:
         raise ValueError(
             f"a child process loads {setup.name!r} by its name, which must give the same setup; they differ "
-            f"in {'; '.join(map(str, changes(own, named)))}: write it into a module of its own"
+            f"in {list_changes(changes(own, named))}: write it into a module of its own"
         )
 
 

@@ -15,6 +15,8 @@ class Stream(StrEnum):
     """The physics of an episode of a dataset; the index is that of the episode."""
     HIDDEN_PHYSICS = "hidden-physics"
     """The physics that a run or a rehearsal hides; the index is 0."""
+    OTHER_PHYSICS = "other-physics"
+    """The physics of an episode in the second of two simulations; the index is that of the episode."""
     POOL = "pool"
     """The controllers that a run may choose from; the index is 0."""
     INITIAL = "initial"

@@ -8,6 +8,7 @@ from traceback import FrameSummary
 
 _PROJECT = tuple(Path(__file__).parents[1] / name for name in ("workers", "svaedc", "cluster"))
 _LIBRARIES = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
+_GENERATED = "<string>"  # the file of what Python writes itself, such as the __init__ of a dataclass
 _LONGEST = 300
 """A message is cut after so many characters where it has to fit one line."""
 
@@ -40,9 +41,8 @@ def full_traceback(error: BaseException) -> str:
 
 
 def _own_frame(frames: Sequence[FrameSummary]) -> FrameSummary:
-    made = ("<string>", "<stdin>")  # such as the __init__ of a dataclass
     foreign = [
-        frame for frame in frames if not _is_in(frame.filename, _PROJECT) and frame.filename not in made[:1]
+        frame for frame in frames if frame.filename != _GENERATED and not _is_in(frame.filename, _PROJECT)
     ]
     own = [frame for frame in foreign if not _is_in(frame.filename, _LIBRARIES)]
     if own:

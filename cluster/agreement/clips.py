@@ -8,7 +8,7 @@ import numpy as np
 from cluster.errors import UsageError
 from cluster.files import replacing
 from cluster.inputs import usage_errors
-from cluster.progress import say
+from cluster.progress import ProgressLine, say
 from cluster.rendering.frames import add_title, clip, pictures, usual_speed
 from cluster.rendering.video import Picture, write
 from workers.collection.twins import Twins
@@ -42,17 +42,14 @@ def draw_worst(
     except UsageError as error:
         say(f"no clips: {error}")
         return []
-    written = []
-    for number, pair in enumerate(pairs, 1):
-        path = out / f"worst-{number}.gif"
-        sides = [
-            _pictures_of(setup, name, episode)
-            for setup, name, episode in zip(setups, names, (pair.one, pair.other), strict=True)
-        ]
-        with replacing(path) as unfinished:
-            write(unfinished, path.suffix, _beside(*sides), _RATE)
-        written.append(path.name)
-    return written
+    paths = [out / f"worst-{number}.gif" for number in range(1, len(pairs) + 1)]
+    with ProgressLine("clips", len(pairs), 0) as progress:
+        for path, pair in zip(paths, pairs, strict=True):
+            rows = zip(setups, names, (pair.one, pair.other), strict=True)
+            with replacing(path) as unfinished:
+                write(unfinished, path.suffix, _beside(*(_pictures_of(*row) for row in rows)), _RATE)
+            progress.advance(1, "")
+    return [path.name for path in paths]
 
 
 def _pictures_of(setup: Setup, name: str, episode: Episode) -> Iterator[Picture]:
@@ -63,6 +60,7 @@ def _pictures_of(setup: Setup, name: str, episode: Episode) -> Iterator[Picture]
 
 
 def _beside(left: Iterator[Picture], right: Iterator[Picture]) -> Iterator[Picture]:
+    """Side by side, as long as both last: a clip of another horizon may be shorter."""
     for one, other in zip(left, right, strict=False):
         seam = np.full((one.shape[0], _SEAM, 3), 255, dtype=np.uint8)
         yield np.concatenate([one, seam, other], axis=1)

@@ -1,11 +1,9 @@
 """The driver of `svaedc setups compare`: roll out in both, measure, draw, say."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from cluster.agreement.clips import draw_worst
 from cluster.agreement.figure import scatter
@@ -13,11 +11,11 @@ from cluster.errors import UserError
 from cluster.files import json_text, replacing
 from cluster.inputs import usage_errors
 from cluster.progress import ProgressLine, say
-from svaedc.analysis.agreement import Agreement, Fate, agreement, fate, summary_text, worst
+from svaedc.analysis.agreement import Agreement, Simulated, agreement, summary_text, worst_places
 from svaedc.analysis.strict_json import json_values
 from svaedc.analysis.words import quantity
-from workers.collection.twins import SAME, Twins, require_comparable, twins
-from workers.episode import UNUSABLE, Episode, degrees
+from workers.collection.twins import SAME, Twins, outcomes, require_comparable, twins
+from workers.episode import UNUSABLE
 from workers.setups import Setup
 
 FEWEST = 5
@@ -47,7 +45,6 @@ def compare_setups(
     """
     with usage_errors():
         require_comparable(one, other, gap)
-    names = (one.name, f"{other.name} ({gap})" if one.name == other.name else other.name)
     with ProgressLine("controllers", count, 0) as progress:
         pairs = list(_with_progress(twins(one, other, seed, count, gap), progress))
     usable = [pair for pair in pairs if not {pair.one.stop, pair.other.stop} & UNUSABLE]
@@ -56,29 +53,26 @@ def compare_setups(
             f"only {quantity(len(usable), 'controller')} of {count} came to the end in both simulations; at "
             f"least {FEWEST} must: try `svaedc check --setup {one.name}` and --setup {other.name}"
         )
-    measures, best, successes = _measure(one, other, usable, names)
-    left_out = {names[0]: _unusable(pairs, "one"), names[1]: _unusable(pairs, "other")}
-    document = json_values(
-        {
-            "setups": list(names),
-            "seed": seed,
-            "physics": gap,
-            "controllers": count,
-            "usable": len(usable),
-            "unusable": left_out,
-            "measures": [asdict(each) for each in measures],
-            "success": dict(successes),
-            "best": asdict(best),
-        }
+    there = f"{other.name} ({gap})" if one.name == other.name else other.name
+    sides = (
+        Simulated(one.name, one.success, **outcomes(one, [pair.one for pair in usable])),
+        Simulated(there, other.success, **outcomes(other, [pair.other for pair in usable])),
     )
-    say(summary_text(measures, best, names, successes))
+    found = agreement(*sides)
+    lost = (_count_lost(pairs, "one"), _count_lost(pairs, "other"))
+    _say(found, lost)
     if gap == SAME and one.physics != other.physics:
         say(f"the ranges of their physics differ; both ran under those of {one.name} (--gap gives others)")
-    if len(usable) < count:
-        lost = " and ".join(f"{number} in {name}" for name, number in left_out.items())
-        say(f"left out, for they diverged or failed: {lost}")
+    asked = {"seed": seed, "physics": gap, "controllers": count}
+    document = json_values(asked | _facts(found, usable, lost))
     if out is not None:
-        _write(out, one, other, usable, names, document)
+        out.mkdir(parents=True, exist_ok=True)
+        with replacing(out / "agreement.json") as unfinished:
+            unfinished.write_text(json_text(document), encoding="utf-8")
+        scatter(out / "agreement.png", *sides, found)
+        worst = [usable[place] for place in worst_places(sides[0].f, sides[1].f, CLIPS)]
+        clips = draw_worst(out, (one, other), found.names, worst)
+        say(f"wrote {out}: {', '.join(['agreement.json', 'agreement.png', *clips])}")
     return document
 
 
@@ -88,55 +82,24 @@ def _with_progress(pairs: Iterator[Twins], progress: ProgressLine) -> Iterator[T
         yield pair
 
 
-def _unusable(pairs: Sequence[Twins], side: str) -> int:
+def _count_lost(pairs: list[Twins], side: str) -> int:
+    """How many episodes of a side diverged or failed."""
     return sum(getattr(pair, side).stop in UNUSABLE for pair in pairs)
 
 
-def _measure(
-    one: Setup, other: Setup, pairs: Sequence[Twins], names: tuple[str, str]
-) -> tuple[list[Agreement], Fate, Mapping[str, float]]:
-    """Objective, badness, and each bad condition that both have."""
-    columns = {
-        "objective": [(pair.one.f, pair.other.f) for pair in pairs],
-        "badness": [(pair.one.y, pair.other.y) for pair in pairs],
+def _say(found: Agreement, lost: tuple[int, int]) -> None:
+    say(summary_text(found))
+    if any(lost):
+        told = " and ".join(f"{number} in {name}" for name, number in zip(found.names, lost, strict=True))
+        say(f"left out, for they diverged or failed: {told}")
+
+
+def _facts(found: Agreement, usable: list[Twins], lost: tuple[int, int]) -> dict[str, Any]:
+    return {
+        "setups": list(found.names),
+        "usable": len(usable),
+        "unusable": dict(zip(found.names, lost, strict=True)),
+        "measures": [asdict(each) for each in found.measures],
+        "success": dict(zip(found.names, found.success, strict=True)),
+        "best": asdict(found.best),
     }
-    for condition in one.conditions if not one.task.graded and not other.task.graded else ():
-        if condition in other.conditions:
-            columns[condition] = [
-                (_share(one, condition, pair.one), _share(other, condition, pair.other)) for pair in pairs
-            ]
-    sides = {name: np.array(rows, dtype=np.float64).T for name, rows in columns.items()}
-    limits = (one.success, other.success)
-    successes = {
-        name: float((row > limit).mean())
-        for name, row, limit in zip(names, sides["objective"], limits, strict=True)
-    }
-    measures = [agreement(name, rows[0], rows[1]) for name, rows in sides.items()]
-    one_f, other_f = sides["objective"]
-    return measures, fate(one_f, other_f, limits), successes
-
-
-def _share(setup: Setup, condition: str, episode: Episode) -> float:
-    """The share of an episode's steps in which a condition held."""
-    return float(degrees(episode.bad & np.uint8(1 << setup.conditions.index(condition))).mean())
-
-
-def _write(
-    out: Path,
-    one: Setup,
-    other: Setup,
-    pairs: Sequence[Twins],
-    names: tuple[str, str],
-    document: Mapping[str, Any],
-) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    with replacing(out / "agreement.json") as unfinished:
-        unfinished.write_text(json_text(document), encoding="utf-8")
-    f, y = (
-        np.array([(getattr(pair.one, kind), getattr(pair.other, kind)) for pair in pairs]).T
-        for kind in ("f", "y")
-    )
-    scatter(out / "agreement.png", names, f, y, document)
-    written = draw_worst(out, (one, other), names, [pairs[place] for place in worst(f[0], f[1], CLIPS)])
-    clips = f", {', '.join(written)}" if written else ""
-    say(f"wrote {out}: agreement.json, agreement.png{clips}")

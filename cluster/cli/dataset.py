@@ -29,7 +29,7 @@ AsJson = Annotated[
         "--json",
         help="Print one JSON document, and nothing else, on standard output: folder, setup, episodes, "
         "shards, bytes, horizon, control_step (s), channels, parameters, storage, seed, repeats, bad, "
-        "identity, fingerprint, pybullet, numpy, put_aside, statistics (null without episodes), irreducible "
+        "identity, fingerprint, pybullet, numpy and further packages by name, put_aside, statistics (null without episodes), irreducible "
         "(null without repeats), notes. What has no number is null.",
     ),
 ]

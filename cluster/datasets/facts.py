@@ -8,7 +8,7 @@ from cluster.errors import UserError
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.notes import notes
-from workers.dataset.repeats import irreducible
+from workers.dataset.repeats import Irreducible, irreducible
 from workers.dataset.statistics import MARKS, statistics
 
 
@@ -20,6 +20,7 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
     """
     episodes = dataset.episodes()
     try:
+        undecided = irreducible(dataset) if dataset.identity.repeats > 1 and episodes else None
         return {
             "folder": str(dataset.folder),
             "episodes": episodes,
@@ -29,8 +30,8 @@ def dataset_facts(dataset: Dataset) -> dict[str, Any]:
             "put_aside": [shard.name for shard in quarantined_shards(dataset)],
             **_identity(dataset.identity),
             "statistics": _statistics(dataset) if episodes else None,
-            "irreducible": _irreducible(dataset),
-            "notes": notes(dataset),
+            "irreducible": _irreducible(undecided),
+            "notes": [*notes(dataset), *(undecided.notes if undecided else ())],
         }
     except ValueError as error:
         raise UserError(
@@ -58,8 +59,7 @@ def _identity(identity: Identity) -> dict[str, Any]:
             "name": identity.bad_name,
             "digest": identity.bad_digest,
         },
-        "pybullet": identity.pybullet,
-        "numpy": identity.numpy,
+        **dict(identity.versions),
     }
 
 
@@ -77,7 +77,6 @@ def _statistics(dataset: Dataset) -> dict[str, Any]:
     }
 
 
-def _irreducible(dataset: Dataset) -> dict[str, Any] | None:
+def _irreducible(found: Irreducible | None) -> dict[str, Any] | None:
     """What the controller does not decide; nothing of a dataset without repeats, or with too few of them."""
-    found = irreducible(dataset) if dataset.identity.repeats > 1 and dataset.episodes() else None
     return asdict(found) if found else None

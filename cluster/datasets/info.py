@@ -6,11 +6,8 @@ from svaedc.analysis.words import quantity
 from workers.dataset.folder import Dataset
 from workers.dataset.identity import Identity
 from workers.dataset.notes import notes
-from workers.dataset.repeats import irreducible
+from workers.dataset.repeats import Irreducible, irreducible
 from workers.dataset.statistics import Statistics, statistics
-
-HALF = 0.5
-"""With a larger share that no controller decides, the remedy is told."""
 
 
 def dataset_info(dataset: Dataset) -> dict[str, str]:
@@ -33,13 +30,15 @@ def dataset_info(dataset: Dataset) -> dict[str, str]:
         "repeats": f"{identity.repeats} of each controller",
         "identity": identity.digest,
         "fingerprint": dataset.fingerprint(),
-        "made with": f"pybullet {identity.pybullet}, numpy {identity.numpy}",
+        "made with": ", ".join(" ".join(package) for package in identity.versions),
         "put aside": ", ".join(shard.name for shard in quarantined_shards(dataset)) or "none",
     }
     try:
         rows |= _table_rows(statistics(dataset)) if episodes else {}
-        rows |= _irreducible(dataset) if identity.repeats > 1 else {}
-        rows |= {f"note {number}": note for number, note in enumerate(notes(dataset), start=1)}
+        undecided = irreducible(dataset) if identity.repeats > 1 else None
+        rows |= _irreducible(undecided) if identity.repeats > 1 else {}
+        told = (*notes(dataset), *(undecided.notes if undecided else ()))
+        rows |= {f"note {number}": note for number, note in enumerate(told, start=1)}
     except ValueError as error:
         raise UserError(
             f"{error}; `svaedc dataset verify {dataset.folder}` lists everything that is wrong"
@@ -64,19 +63,12 @@ def _g_bad(identity: Identity) -> str:
     return f"{name}, {identity.bad_kind}"
 
 
-def _irreducible(dataset: Dataset) -> dict[str, str]:
+def _irreducible(found: Irreducible | None) -> dict[str, str]:
     """What the controller does not decide."""
-    found = irreducible(dataset)
     if found is None:
         return {"irreducible": "unknown: fewer than two controllers have all their repeats"}
     low, high = found.xi
-    rows = {
+    return {
         "irreducible": f"{found.y:.2f} of the variance of y, {found.f:.2f} of that of f "
         f"({found.controllers} controllers); of xi, {low:.2f} to {high:.2f} of the error of its median"
     }
-    if max(found.y, found.f) > HALF:
-        rows["note"] = (
-            "half of what happens is decided by the hidden physics, whatever the controller: no model can "
-            "learn that; narrow the ranges of physics, or give the controller more feedback"
-        )
-    return rows

@@ -8,7 +8,7 @@ from cluster.errors import UserError
 from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
 from workers.setups import load
-from workers.setups.declared import changes, declaration
+from workers.setups.declared import changes, declaration, list_changes
 
 
 class TrainedModel(NamedTuple):
@@ -65,13 +65,13 @@ def trained_model(path: Path, setup: str, twin: str = "") -> TrainedModel:
 def _differing(one: str, other: str) -> str:
     """In what two setups differ of what a model knows; "" where it can serve both."""
     try:
-        told, asked = (
+        known, asked = (
             {name: value for name, value in declaration(load(setup)).items() if name in _KNOWN}
             for setup in (one, other)
         )
     except LookupError as error:
         return f"all that is known: {error.args[0]}"
-    return "; ".join(map(str, changes(told, asked)))
+    return list_changes(changes(known, asked))
 
 
 _KNOWN = ("parameters", "observation", "horizon", "control_step")

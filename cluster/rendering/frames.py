@@ -176,12 +176,25 @@ def pictures(
     Yields:
         A picture of each moment, with time, conditions and the note written on it.
     """
-    steps = [moment.step for moment in moments]
-    drawn = frames(setup, episode.xi, steps, size)
-    with ProgressLine("pictures", len(steps), 0) as progress:
-        for moment, picture in zip(moments, drawn, strict=True):
-            corner = f"{(moment.step + 1) * setup.control_step:.2f} s"
-            yield caption(picture, corner, note, moment.conditions)
+    drawn = frames(setup, episode.xi, [moment.step for moment in moments], size)
+    for moment, picture in zip(moments, drawn, strict=True):
+        corner = f"{(moment.step + 1) * setup.control_step:.2f} s"
+        yield caption(picture, corner, note, moment.conditions)
+
+
+def with_progress(drawn: Iterator[Picture], count: int) -> Iterator[Picture]:
+    """Say how far the drawing is.
+
+    Args:
+        drawn: pictures.
+        count: how many there will be.
+
+    Yields:
+        The same pictures.
+    """
+    with ProgressLine("pictures", count, 0) as progress:
+        for picture in drawn:
+            yield picture
             progress.advance(1, "")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from cluster.files import replacing
 from cluster.progress import say
 from cluster.rendering.episodes import episode_to_draw
-from cluster.rendering.frames import clip, drawable, pictures, stills, summary, usual_speed
+from cluster.rendering.frames import clip, drawable, pictures, stills, summary, usual_speed, with_progress
 from cluster.rendering.model_frames import beside
 from cluster.rendering.video import STILLS, write
 from workers.physics import Physics
@@ -57,7 +57,7 @@ def render(setup: Setup, x: str, physics: Physics | None, drawing: Drawing, mode
     else:
         moments, note = clip(setup, episode, pace, drawing.fps), f"{setup.name} {pace:.2g}x"
     if model is None:
-        drawn = pictures(setup, episode, moments, size, note)
+        drawn = with_progress(pictures(setup, episode, moments, size, note), len(moments))
     else:
         drawn = beside(setup, episode, model, moments, size, out.suffix)
     out.parent.mkdir(parents=True, exist_ok=True)

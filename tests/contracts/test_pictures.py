@@ -63,7 +63,7 @@ def _simulated(environment, names: set[str]) -> tuple[dict[str, tuple[float, ...
     if hasattr(environment, "_world"):
         client = environment._world.client
         return dict(_links(client, names)), _free(client)[1:]
-    model, data = environment._simulation.model, environment._simulation.data
+    model, data = environment.simulation.model, environment.simulation.data
 
     def pose(body: int) -> tuple[float, ...]:
         return (*data.xpos[body], *np.roll(data.xquat[body], -1))

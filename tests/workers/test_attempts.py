@@ -14,6 +14,31 @@ RAISES = ("force = command[0]", "force = {True: command[0]}[command[0] < 0.9]")
 """For one in ten of all controllers, a dictionary has no such key."""
 
 
+HANGS = (
+    ("force = command[0]", "force = self.wait()"),
+    (
+        "    def record(self):",
+        "    def wait(self):\n        import time\n        time.sleep(100)\n\n    def record(self):",
+    ),
+)
+
+
+def require_timeout(code: str, file: str, folder) -> None:
+    """Run code in a process of its own: it must end by a timeout whose traceback names the file."""
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={"PYTHONPATH": ":".join(sys.path)},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=60,
+    )
+    assert ended.returncode == 1
+    assert "Timeout" in ended.stderr
+    assert file in ended.stderr
+
+
 def cases(setup, count: int = 40):
     return [draw(setup, 0, index) for index in range(count)]
 
@@ -75,11 +100,7 @@ def test_an_exit_in_a_users_code_is_an_error_as_any_other(own_robot):
 
 def test_what_hangs_ends_its_process_and_its_traceback_is_told(own_robot, tmp_path):
     own_robot(
-        ("force = command[0]", "force = self.wait()"),
-        (
-            "    def record(self):",
-            "    def wait(self):\n        import time\n        time.sleep(100)\n\n    def record(self):",
-        ),
+        *HANGS,
         name="slow_glider",
     )
     code = (
@@ -88,18 +109,7 @@ def test_what_hangs_ends_its_process_and_its_traceback_is_told(own_robot, tmp_pa
         "setup = setups.load('slow_glider')\n"
         "Attempts(setup, timeout=0.5).rollout(*draw(setup, 0, 0))\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={"PYTHONPATH": ":".join(sys.path)},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=60,
-    )
-    assert ended.returncode == 1
-    assert "Timeout" in ended.stderr
-    assert "slow_glider.py" in ended.stderr
+    require_timeout(code, "slow_glider.py", tmp_path)
 
 
 def test_a_pause_between_episodes_is_no_hang(own_robot):
@@ -125,11 +135,7 @@ def test_a_sound_episode_is_what_the_control_loop_gives(own_robot):
 
 def test_a_try_out_that_hangs_ends_its_process_and_shows_where(own_robot, tmp_path):
     own_robot(
-        ("force = command[0]", "force = self.wait()"),
-        (
-            "    def record(self):",
-            "    def wait(self):\n        import time\n        time.sleep(100)\n\n    def record(self):",
-        ),
+        *HANGS,
         name="stuck_glider",
     )
     code = (
@@ -137,15 +143,4 @@ def test_a_try_out_that_hangs_ends_its_process_and_shows_where(own_robot, tmp_pa
         "shard.Watchdog = lambda: attempts.Watchdog(0.5)\n"
         "shard.require_working(setups.load('stuck_glider'), 0)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={"PYTHONPATH": ":".join(sys.path)},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=60,
-    )
-    assert ended.returncode == 1
-    assert "Timeout" in ended.stderr
-    assert "stuck_glider.py" in ended.stderr
+    require_timeout(code, "stuck_glider.py", tmp_path)

@@ -1,10 +1,14 @@
 """The same controllers in two simulations."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from workers.attempts import SafeRollouts
+from workers.dataset.statistics import bad_steps
 from workers.episode import Episode
 from workers.isolation import IsolatedAttempts
 from workers.physics import Physics
@@ -49,13 +53,14 @@ def require_comparable(one: Setup, other: Setup, gap: str) -> None:
             f"{one.name} and {other.name} cannot run the same controllers: their parameters differ in {odd} "
             f"({_place(own, odd)} and {_place(others, odd)})"
         )
+    is_relative = gap == SAME or _share(gap) is not None
     odd_physics = sorted(one.physics.intervals.keys() ^ other.physics.intervals.keys())
-    if odd_physics and (gap == SAME or _share(gap) is not None):
+    if odd_physics and is_relative:
         raise ValueError(
             f"{one.name} and {other.name} cannot have the same physics: {odd_physics[0]} is a parameter of "
             "one of them only; name a gap of the second"
         )
-    if gap != SAME and _share(gap) is None:
+    if not is_relative:
         other.gap(gap)
 
 
@@ -89,6 +94,25 @@ def twins(
             yield Twins(storable(one, left.result()), storable(other, right.result()))
 
 
+def outcomes(setup: Setup, episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Put together what episodes of a setup came to.
+
+    Args:
+        setup: of the episodes.
+        episodes: at least one.
+
+    Returns:
+        Under `f` and `y` the objective and badness of each, [n]; under `bad`, by the name of each bad
+        condition, the share of steps in which it held, or its mean degree, [n].
+    """
+    bad = bad_steps(np.stack([episode.bad for episode in episodes]), len(setup.conditions)) / setup.horizon
+    return {
+        "f": np.array([episode.f for episode in episodes]),
+        "y": np.array([episode.y for episode in episodes]),
+        "bad": dict(zip(setup.conditions, bad.T, strict=True)),
+    }
+
+
 def _physics_there(other: Setup, gap: str, seed: int, index: int, physics: Physics) -> Physics:
     """The physics of the second simulation, where the first has these."""
     if gap == SAME:
@@ -96,7 +120,7 @@ def _physics_there(other: Setup, gap: str, seed: int, index: int, physics: Physi
     share = _share(gap)
     if share is not None:
         return {name: value * (1.0 + share) for name, value in physics.items()}
-    return other.gap(gap).draw(generator(seed, Stream.HIDDEN_PHYSICS, index))
+    return other.gap(gap).draw(generator(seed, Stream.OTHER_PHYSICS, index))
 
 
 def _share(gap: str) -> float | None:

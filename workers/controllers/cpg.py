@@ -131,8 +131,8 @@ class PatternGenerator(Controller):
         def command(step: int) -> list[float]:
             return rows[step].tolist()
 
-        unlimited = (inf,) * rows.shape[1]
-        return PlannedCommand(command, JointPlan(rows, tuple(-end for end in unlimited), unlimited))
+        joints = rows.shape[1]
+        return PlannedCommand(command, JointPlan(rows, (-inf,) * joints, (inf,) * joints))
 
     def commands(self, x: Float32[np.ndarray, " d"], horizon: int) -> Float[np.ndarray, "horizon 18"]:
         """Plan the joint angles of all steps.

@@ -76,6 +76,11 @@ class Identity:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
 
     @property
+    def versions(self) -> tuple[tuple[str, str], ...]:
+        """Name and version of every package that decides the bytes of an episode."""
+        return ("pybullet", self.pybullet), ("numpy", self.numpy), *self.packages
+
+    @property
     def digest(self) -> str:
         """SHA-256 of the identity in canonical JSON."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()

@@ -9,6 +9,7 @@ from jaxtyping import Float32, Float64, Int64
 from workers.dataset.folder import Dataset
 from workers.episode import UNUSABLE
 
+_MUCH = 0.5
 TRAJECTORIES = 1_000
 """At most so many episodes are used for the share of ξ."""
 
@@ -32,6 +33,16 @@ class Irreducible:
     y: float
     f: float
     xi: tuple[float, float]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to do where controllers decide less than half of y or f; nothing where they decide more."""
+        if not (self.y > _MUCH or self.f > _MUCH):  # NaN where nothing varies
+            return ()
+        return (
+            "more than half of what happens is decided by the hidden physics, whatever the controller: no "
+            "model can learn that; narrow the ranges of physics, or give the controller more feedback",
+        )
 
 
 def irreducible(dataset: Dataset) -> Irreducible | None:

@@ -1,20 +1,19 @@
 """Daisy on flat ground in MuJoCo: the same numbers, the same channels, another engine."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
-from jaxtyping import Float
 
 from workers.environments.daisy import CONTROL_STEP, ROBOT, SCENERY, SUBSTEPS, DaisyModel, observation
 from workers.environments.daisy_body import JOINTS
-from workers.environments.environment import Command, Environment, Observed
+from workers.environments.environment import Observed
+from workers.environments.mujoco_environment import MujocoEnvironment, Record
 from workers.environments.tabletop import first_two_axes
 from workers.mujoco import scene
 from workers.mujoco.description import compile_scene, read_robot
 from workers.mujoco.simulation import Simulation
 from workers.physics import Physics
-from workers.plans import JointPlan, PlannedCommand
 
 MOTOR_DAMPING: Final = 20.0
 """kd of the motors, in N·m·s/rad. Bullet's motor is a constraint: in each of its steps it removes a share of
@@ -22,11 +21,8 @@ the position error, `stiffness`, that is, it seeks the speed stiffness · error 
 
 _BODY = "body"
 
-Record = Float[np.ndarray, " width"]
-"""It holds joint angles, position and quaternion of the body, joint speeds, elbow contact (0 or 1)."""
 
-
-class MujocoDaisy(Environment):
+class MujocoDaisy(MujocoEnvironment):
     """Daisy on the plane z = 0, its motors aiming at the commanded joint angles.
 
     Friction, restitution (`workers.mujoco.scene`) and the links' damping are modelled; the last takes its
@@ -49,13 +45,13 @@ class MujocoDaisy(Environment):
         spec = read_robot(ROBOT.urdf)
         self._parts = [geom.name for geom in spec.geoms]
         _furnish(spec)
-        self._simulation = Simulation(
+        self.simulation = Simulation(
             compile_scene(spec, "Daisy"), joints=JOINTS, poses=(_BODY,), with_speeds=JOINTS, substeps=SUBSTEPS
         )
 
     def reset(self, physics: Physics) -> None:
         """The robot at home, 5 mm above the height at which it stands, with the dynamics of `physics`."""
-        simulation = self._simulation
+        simulation = self.simulation
         for part in self._parts:
             scene.set_contact(
                 simulation.model,
@@ -67,30 +63,6 @@ class MujocoDaisy(Environment):
         simulation.keep = 1.0 - physics["link_damping"] * CONTROL_STEP / SUBSTEPS
         simulation.reset(zip(JOINTS, ROBOT.home, strict=True))
 
-    def step(self, command: Sequence[float]) -> Record:
-        """Aim at the joint angles for one control step."""
-        self._simulation.step(command)
-        return self.record()
-
-    def record(self) -> Record:
-        """See `Record`."""
-        return self._simulation.record()
-
-    def run_commands(self, command: Command, steps: int) -> Any:
-        """Apply the commands of an episode; those that are planned beforehand in compiled code.
-
-        Args:
-            command: of each step.
-            steps: how many.
-
-        Returns:
-            The record of each step, together as `observed` takes them.
-        """
-        plan = command.plan if isinstance(command, PlannedCommand) else None
-        if isinstance(plan, JointPlan):
-            return self._simulation.run_joints(plan, JOINTS)
-        return super().run_commands(command, steps)
-
     def observed(self, records: Iterable[Record]) -> Observed:
         """ξ in the order of `observation`; signals: `joint_speeds` [18, T] and `elbow_contact` [T]."""
         columns = np.asarray(records).T
@@ -99,9 +71,6 @@ class MujocoDaisy(Environment):
             xi=np.concatenate([angles, origin, first_two_axes(quaternion.T)]).astype(np.float32),
             signals={"joint_speeds": speeds, "elbow_contact": columns[-1] != 0.0},
         )
-
-    def close(self) -> None:
-        """Nothing is open."""
 
 
 def _furnish(spec: Any) -> None:

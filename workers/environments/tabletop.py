@@ -49,11 +49,16 @@ class TabletopModel:
     solver_iterations: int
     table: tuple[Interval, Interval]
 
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Their names, `object1` and so on, in channels and in physics."""
+        return tuple(f"object{number}" for number in range(1, len(self.cylinders) + 1))
+
     def nominal_physics(self) -> dict[str, float]:
         """Nominal values of all randomised parameters: `object1_mass` (kg) and so on."""
         return {
-            f"object{number}_{name}": value
-            for number, cylinder in enumerate(self.cylinders, 1)
+            f"{own}_{name}": value
+            for own, cylinder in zip(self.objects, self.cylinders, strict=True)
             for name, value in cylinder.nominal.items()
         }
 
@@ -76,7 +81,7 @@ class TabletopModel:
             Channel(name, "rad", low - slack, high + slack)
             for name, low, high in zip(arm.joints, arm.lower, arm.upper, strict=True)
         ]
-        objects = [c for n in range(1, len(self.cylinders) + 1) for c in _object_channels(f"object{n}")]
+        objects = [channel for name in self.objects for channel in _object_channels(name)]
         return (*joints, *objects)
 
     def action(self) -> tuple[Channel, ...]:
@@ -87,7 +92,7 @@ class TabletopModel:
     def scenery(self) -> Scenery:
         """The arm, its objects and the table, from above the side that they are pushed to."""
         arm = Machine(Path(self.arm.urdf), self.arm.joints, self.arm.base)
-        rolls = (Roll(c.radius, c.height, f"object{n}") for n, c in enumerate(self.cylinders, 1))
+        rolls = (Roll(c.radius, c.height, name) for name, c in zip(self.objects, self.cylinders, strict=True))
         x, y = (float(mean) for mean in np.mean([c.start for c in self.cylinders], axis=0))
         return Scenery(
             bodies=(arm, *rolls),
@@ -179,13 +184,12 @@ class Tabletop(ArmScene):
         if not self._is_sane():
             self._world.close()
             self._build()
-        for number, cylinder in enumerate(self._cylinders, 1):
-            prefix = f"object{number}_"
+        for name, cylinder in zip(self._model.objects, self._cylinders, strict=True):
             cylinder.set_dynamics(
-                mass=physics[prefix + "mass"],
-                friction=physics[prefix + "friction"],
-                rolling_friction=physics[prefix + "rolling_friction"],
-                restitution=physics[prefix + "restitution"],
+                mass=physics[f"{name}_mass"],
+                friction=physics[f"{name}_friction"],
+                rolling_friction=physics[f"{name}_rolling_friction"],
+                restitution=physics[f"{name}_restitution"],
             )
         self._world.forget_contacts()
         self.arm.reset()

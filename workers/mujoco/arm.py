@@ -1,15 +1,15 @@
 """An arm bolted to the world, in a scene of MuJoCo; to a controller it is what PyBullet's arm is."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from workers.mujoco.description import child_links, read_robot, require_joints
+from workers.mujoco.description import child_links, read_robot
 from workers.mujoco.scene import set_joint
 from workers.mujoco.simulation import Simulation
 from workers.simulation.arm import ArmModel, ArmReadings, ArmState, Vector
-from workers.simulation.description import robot_path
+from workers.simulation.description import require_joints, robot_path
 
 
 class MujocoArm(ArmReadings):
@@ -17,13 +17,14 @@ class MujocoArm(ArmReadings):
 
     Args:
         simulation: of the scene that it stands in, in which its joints come first.
-        model: of it.
+        joints: how many they are.
+        hand: name of its hand's link.
     """
 
-    def __init__(self, simulation: Simulation, model: ArmModel) -> None:
+    def __init__(self, simulation: Simulation, joints: int, hand: str) -> None:
         self._simulation = simulation
-        self._count = len(model.joints)
-        self._body = simulation.model.body(hand_link(model)).id
+        self._count = joints
+        self._body = simulation.model.body(hand).id
 
     @property
     def state(self) -> ArmState:
@@ -67,7 +68,7 @@ def arm_scene(model: ArmModel) -> Any:
     """
     path = robot_path(model.urdf)
     spec = read_robot(path)
-    require_joints(spec, path, (*model.joints, *model.fingers))
+    require_joints([joint.name for joint in spec.joints], path, (*model.joints, *model.fingers))
     for equality in list(spec.equalities):  # fingers that mimic each other
         spec.delete(equality)
     for finger in model.fingers:
@@ -78,36 +79,40 @@ def arm_scene(model: ArmModel) -> Any:
     return spec
 
 
-def hand_link(model: ArmModel) -> str:
-    """Name of the link whose frame is the hand."""
-    return child_links(robot_path(model.urdf))[model.hand]
+class ArmLinks(NamedTuple):
+    """Links of an arm, whose geoms have the same names.
+
+    Attributes:
+        hand: the one whose frame is the hand.
+        first: the one nearest to the base that moves.
+        solid: geoms that touch things, the base's first: all but the fingers'.
+        moving: those of them that move.
+    """
+
+    hand: str
+    first: str
+    solid: tuple[str, ...]
+    moving: tuple[str, ...]
 
 
-def solid_links(spec: Any, model: ArmModel) -> list[str]:
-    """Name the geoms of an arm that touch things: all but the fingers'.
+def arm_links(spec: Any, model: ArmModel) -> ArmLinks:
+    """Find the links of an arm.
 
     Args:
-        spec: of the arm alone.
+        spec: of the arm alone, as from `arm_scene`.
         model: of the arm.
 
     Returns:
-        Their names, the base's first.
+        Their names.
     """
     children = child_links(robot_path(model.urdf))
     fingers = {children[finger] for finger in model.fingers}
-    return [geom.name for geom in spec.geoms if geom.parent.name not in fingers]
-
-
-def moving_links(spec: Any, model: ArmModel) -> list[str]:
-    """Name the geoms of an arm that touch things and move.
-
-    Args:
-        spec: of the arm alone.
-        model: of the arm.
-
-    Returns:
-        Their names, from base to tip.
-    """
-    base = spec.body(child_links(robot_path(model.urdf))[model.joints[0]])
-    moved = {body.name for body in (base, *base.find_all("body"))}
-    return [name for name in solid_links(spec, model) if spec.geom(name).parent.name in moved]
+    first = spec.body(children[model.joints[0]])
+    moved = {body.name for body in (first, *first.find_all("body"))}
+    solid = [geom for geom in spec.geoms if geom.parent.name not in fingers]
+    return ArmLinks(
+        hand=children[model.hand],
+        first=first.name,
+        solid=tuple(geom.name for geom in solid),
+        moving=tuple(geom.name for geom in solid if geom.parent.name in moved),
+    )

@@ -1,11 +1,12 @@
 """Descriptions of robots, read by MuJoCo from the same URDF files and texts that PyBullet reads."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import mujoco
+
+from workers.simulation.description import require_description
 
 _PACKAGE = "package://"
 
@@ -35,23 +36,6 @@ def read_robot(urdf: Path | str) -> Any:
     return spec
 
 
-def require_joints(spec: Any, owner: object, needed: Iterable[str]) -> None:
-    """Refuse a robot that lacks a joint.
-
-    Args:
-        spec: of it.
-        owner: file that describes it, for the error.
-        needed: names of joints.
-
-    Raises:
-        ValueError: one of them is missing; the error names it, and all that there are.
-    """
-    found = [joint.name for joint in spec.joints]
-    missing = [name for name in needed if name not in found]
-    if missing:
-        raise ValueError(f"{owner} has no joint {missing[0]!r}; it has {', '.join(found) or 'none'}")
-
-
 def child_links(path: Path) -> dict[str, str]:
     """The link that each joint of a URDF file carries; MuJoCo keeps no names of joints that do not move."""
     joints = ElementTree.parse(path).getroot().iterfind("joint")
@@ -78,9 +62,8 @@ def compile_scene(spec: Any, owner: object) -> Any:
 
 
 def _read(urdf: Path | str) -> Any:
-    if isinstance(urdf, Path) and not urdf.is_file():
-        there = ", ".join(sorted(each.name for each in urdf.parent.glob("*.urdf"))) or "no *.urdf"
-        raise FileNotFoundError(f"there is no robot description {urdf}; the folder holds {there}")
+    if isinstance(urdf, Path):
+        require_description(urdf)
     try:
         read = mujoco.MjSpec.from_file if isinstance(urdf, Path) else mujoco.MjSpec.from_string
         return read(str(urdf))

@@ -31,9 +31,15 @@ _velocity = _function("mj_objectVelocity", _ADDRESS, _ADDRESS, _INT, _INT, _ADDR
 _compile = numba.njit(cache=True, error_model="numpy")
 
 
+Scene = tuple[int, int, np.ndarray, int, float]
+"""It has the addresses of mjModel and mjData, the data's ctrl, MuJoCo's steps in each step, and the share of
+every velocity that each of them ends with."""
+
+
 @_compile
 @no_type_check
-def _advance(model: int, data: int, substeps: int, keep: float, qvel: np.ndarray) -> None:
+def _advance(scene: Scene, qvel: np.ndarray) -> None:
+    model, data, _, substeps, keep = scene
     for _ in range(substeps):
         _step2(model, data)
         for dof in range(len(qvel)):
@@ -61,57 +67,44 @@ def _record(watched: tuple[np.ndarray, ...], record: np.ndarray) -> None:
 @_compile
 @no_type_check
 def run_joints(
-    model: int,
-    data: int,
+    scene: Scene,
     rows: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    addresses: np.ndarray,
-    ctrl: np.ndarray,
-    substeps: int,
-    keep: float,
+    limits: tuple[np.ndarray, np.ndarray],
+    moved: np.ndarray,
     watched: tuple[np.ndarray, ...],
     records: np.ndarray,
 ) -> None:
     """Run the rows of a `JointPlan`: 0 for every command that leads a joint further beyond its limit.
 
     Args:
-        model: address of the mjModel.
-        data: address of its mjData.
+        scene: that is advanced.
         rows: commands, [T, joints].
-        lower: position of each joint at which it is still commanded downwards.
-        upper: the same upwards.
-        addresses: of each joint's position in qpos.
-        ctrl: of the data.
-        substeps: of each step.
-        keep: share of every velocity that a substep ends with.
+        limits: positions of each joint at which it is still commanded downwards, and upwards.
+        moved: place of each joint in qpos.
         watched: what `Simulation.record` reads.
         records: they are written here, [T, width].
     """
-    qpos, qvel = watched[0], watched[1]
+    ctrl, qpos, qvel = scene[2], watched[0], watched[1]
+    lower, upper = limits
     for step in range(len(rows)):
         for joint in range(len(ctrl)):
-            command, angle = rows[step, joint], qpos[addresses[joint]]
+            command, angle = rows[step, joint], qpos[moved[joint]]
             stays = (command > 0.0 and angle >= upper[joint]) or (command < 0.0 and angle <= lower[joint])
             ctrl[joint] = 0.0 if stays else command
-        _advance(model, data, substeps, keep, qvel)
+        _advance(scene, qvel)
         _record(watched, records[step])
 
 
 @_compile
 @no_type_check
 def run_hand(
-    model: int,
-    data: int,
+    scene: Scene,
     rows: np.ndarray,
     turning: tuple[float, float],
     limits: np.ndarray,
     hand: int,
     state: tuple[np.ndarray, ...],
     scratch: tuple[np.ndarray, ...],
-    ctrl: np.ndarray,
-    substeps: int,
-    keep: float,
     watched: tuple[np.ndarray, ...],
     records: np.ndarray,
 ) -> None:
@@ -120,8 +113,7 @@ def run_hand(
     torque = Jᵀ [kp (p* − p) + kd (ṗ* − ṗ) + p̈*; Kp e(R*, R) + Kd (ω* − ω)] + gravity, clipped to the limits.
 
     Args:
-        model: address of the mjModel.
-        data: address of its mjData.
+        scene: that is advanced.
         rows: of the plan, [T, 18].
         turning: Kp and Kd.
         limits: greatest torque of each joint, in N·m.
@@ -129,12 +121,10 @@ def run_hand(
         state: position and quaternion (w, x, y, z) of the hand, and the torques against gravity, Coriolis
             and centrifugal forces.
         scratch: room for the linear and angular Jacobians, [3, dofs], and the velocity, [6], angular first.
-        ctrl: of the data.
-        substeps: of each step.
-        keep: share of every velocity that a substep ends with.
         watched: what `Simulation.record` reads.
         records: they are written here, [T, width].
     """
+    model, data, ctrl, _, _ = scene
     position, quaternion, gravity = state
     linear, angular, velocity = scratch
     force, moment = np.empty(3), np.empty(3)
@@ -158,7 +148,7 @@ def run_hand(
             )
             limit = limits[joint]
             ctrl[joint] = limit if torque > limit else -limit if torque < -limit else torque
-        _advance(model, data, substeps, keep, watched[1])
+        _advance(scene, watched[1])
         _record(watched, records[step])
 
 

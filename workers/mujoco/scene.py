@@ -168,15 +168,15 @@ def set_joint(spec: Any, name: str, *, limits: tuple[float, float], damping: flo
     joint.damping = (damping, 0.0, 0.0)
 
 
-def float_links(spec: Any, joint: str) -> None:
-    """Take the weight off all that hangs on a joint, as the controllers of real arms do.
+def float_links(spec: Any, link: str) -> None:
+    """Take the weight off a link and all that hangs on it, as the controllers of real arms do.
 
     Args:
         spec: the scene.
-        joint: name of it, an arm's first.
+        link: name of its body.
     """
-    link = spec.joint(joint).parent
-    for body in (link, *link.find_all("body")):
+    first = spec.body(link)
+    for body in (first, *first.find_all("body")):
         body.gravcomp = 1.0
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from workers.mujoco import episodes
 from workers.mujoco.explosions import keep_exploded
-from workers.plans import HandPlan, JointPlan
+from workers.plans import HandPlan, JointPlan, Plan
 
 _QUATERNION = (1, 2, 3, 0)  # x, y, z, w of MuJoCo's w, x, y, z
 
@@ -45,6 +45,7 @@ class Simulation:
         self.substeps = substeps
         self.keep = 1.0
         """Each MuJoCo step ends with this share of every velocity."""
+        self._point = model.body(point).id if point else 0
         angles = [int(model.joint(name).qposadr[0]) for name in joints]
         starts = [int(model.joint(name).qposadr[0]) for name in poses]
         order = (0, 1, 2, *(3 + place for place in _QUATERNION))
@@ -53,7 +54,7 @@ class Simulation:
         self._watched = (
             self.data.qpos,
             self.data.qvel,
-            self.data.xpos[model.body(point).id] if point else np.empty(0),
+            self.data.xpos[self._point] if point else np.empty(0),
             self.data.sensordata,
             np.array(places, dtype=np.int64),
             np.array(rates, dtype=np.int64),
@@ -96,59 +97,37 @@ class Simulation:
         qpos, qvel, point, sensors, places, rates = self._watched
         return np.concatenate([qpos[places], qvel[rates], point, [float(sensors.any())]])
 
-    def run_joints(self, plan: JointPlan, joints: Sequence[str]) -> Float[np.ndarray, "time width"]:
-        """Advance as many steps as a plan has.
+    def run(self, plan: Plan, steps: int) -> Float[np.ndarray, "steps width"]:
+        """Follow the first steps of a plan, in compiled code.
 
         Args:
-            plan: of commands.
-            joints: names of the hinges that the motors move, in their order.
+            plan: of the joints that the motors move; or of a hand, which is the `point`, of an arm whose
+                joints come first among the scene's.
+            steps: how many, at most all that it has.
 
         Returns:
             The record of each step.
         """
-        records = np.empty((len(plan.rows), self.width))
-        addresses = [self.model.joint(name).qposadr[0] for name in joints]
-        episodes.run_joints(
-            self.model._address,
-            self.data._address,
-            plan.rows,
-            np.array(plan.lower),
-            np.array(plan.upper),
-            np.array(addresses, dtype=np.int64),
-            self.data.ctrl,
-            self.substeps,
-            self.keep,
-            self._watched,
-            records,
-        )
+        rows, records = plan.rows[:steps], np.empty((steps, self.width))
+        scene = (self.model._address, self.data._address, self.data.ctrl, self.substeps, self.keep)
+        if isinstance(plan, JointPlan):
+            moved = self.model.jnt_qposadr[self.model.actuator_trnid[:, 0]].astype(np.int64)
+            limits = np.array(plan.lower), np.array(plan.upper)
+            episodes.run_joints(scene, rows, limits, moved, self._watched, records)
+        else:
+            self._run_hand(scene, rows, plan, records)
         return records
 
-    def run_hand(self, plan: HandPlan, hand: str) -> Float[np.ndarray, "time width"]:
-        """Advance as many steps as a plan has; the arm's joints come first among the scene's.
-
-        Args:
-            plan: of a hand.
-            hand: name of its body.
-
-        Returns:
-            The record of each step.
-        """
-        model, data = self.model, self.data
-        body = model.body(hand).id
-        records = np.empty((len(plan.rows), self.width))
+    def _run_hand(self, scene: episodes.Scene, rows: np.ndarray, plan: HandPlan, records: np.ndarray) -> None:
+        data, dofs = self.data, self.model.nv
         episodes.run_hand(
-            model._address,
-            data._address,
-            plan.rows,
+            scene,
+            rows,
             plan.turning,
             np.array(plan.torque_limits),
-            body,
-            (data.xpos[body], data.xquat[body], data.qfrc_bias),
-            (np.empty((3, model.nv)), np.empty((3, model.nv)), np.empty(6)),
-            data.ctrl,
-            self.substeps,
-            self.keep,
+            self._point,
+            (data.xpos[self._point], data.xquat[self._point], data.qfrc_bias),
+            (np.empty((3, dofs)), np.empty((3, dofs)), np.empty(6)),
             self._watched,
             records,
         )
-        return records

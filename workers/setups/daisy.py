@@ -17,9 +17,8 @@ from workers.environments.daisy import (
     DaisyModel,
     observation,
 )
-from workers.environments.environment import Environment
-from workers.mujoco import extra
 from workers.physics import PhysicsRanges, around
+from workers.setups.engines import in_mujoco
 from workers.setups.setup import Setup
 from workers.tasks.stop import WalkGuard
 from workers.tasks.walk import Walk
@@ -29,10 +28,12 @@ SUCCESS = 15.0  # f of 1.5 m (section 6 of the paper) without a fast joint
 
 HORIZON_27D = 1000  # control steps: 16.7 s (section 6 of the paper)
 REACH_27D = (pi, pi, pi)  # rad, the joints' own limits
+MODEL_27D = DaisyModel(speeds=UNLIMITED, reach=REACH_27D)
 LIMITS_27D = (-250.0, 50.0)  # 200 random controllers: -168 to 18; 50 is 5 m without a fast joint
 
 HORIZON_11D = 1500  # control steps: 25 s (section 6 of the paper)
 REACH_11D = (0.6, 1.0, 1.5)  # rad, as on the hardware
+MODEL_11D = DaisyModel(speeds=UNLIMITED, reach=REACH_11D)
 LIMITS_11D = (-300.0, 80.0)  # 200 random controllers: -233 to 31; 80 is 8 m without a fast joint
 
 REHEARSAL_FRICTION = 1.0  # of rubber on carpet; half of what the data are collected under
@@ -43,7 +44,7 @@ def daisy_27d() -> Setup:
     """Daisy as in the paper's simulations: 27 parameters, 1000 steps at 60 Hz, motors of unlimited speed."""
     return _walking(
         name="daisy-27d",
-        model=DaisyModel(speeds=UNLIMITED, reach=REACH_27D),
+        model=MODEL_27D,
         controller=cpg_27d(REACH_27D),
         horizon=HORIZON_27D,
         nominal=NOMINAL,
@@ -55,7 +56,7 @@ def daisy_11d() -> Setup:
     """Daisy with the controller of the paper's hardware: 11 parameters, 1500 steps at 60 Hz."""
     return _walking(
         name="daisy-11d",
-        model=DaisyModel(speeds=UNLIMITED, reach=REACH_11D),
+        model=MODEL_11D,
         controller=cpg_11d(REACH_11D),
         horizon=HORIZON_11D,
         nominal=NOMINAL,
@@ -69,7 +70,7 @@ def daisy_27d_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    return _in_mujoco(daisy_27d(), REACH_27D)
+    return in_mujoco(daisy_27d(), MODEL_27D)
 
 
 def daisy_11d_mujoco() -> Setup:
@@ -78,19 +79,7 @@ def daisy_11d_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    return _in_mujoco(daisy_11d(), REACH_11D)
-
-
-def _in_mujoco(setup: Setup, reach: tuple[float, float, float]) -> Setup:
-    extra.require_installed()
-    build = partial(_open_in_mujoco, DaisyModel(speeds=UNLIMITED, reach=reach))
-    return replace(setup, name=f"{setup.name}-mujoco", build=build, packages=extra.PACKAGES)
-
-
-def _open_in_mujoco(model: DaisyModel) -> Environment:
-    from workers.environments.mujoco_daisy import MujocoDaisy  # it takes a second
-
-    return MujocoDaisy(model)
+    return in_mujoco(daisy_11d(), MODEL_11D)
 
 
 def daisy_11d_rehearsal() -> Setup:

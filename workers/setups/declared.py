@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 LONGEST: Final = 80
 """Longer values are cut."""
 ABSENT: Final = "none"
+_TOLD: Final = 4
 
 
 class Change(NamedTuple):
@@ -69,6 +70,13 @@ def changes(one: Mapping[str, Any], other: Mapping[str, Any]) -> Iterator[Change
         mine, theirs = one.get(name), other.get(name)
         if mine != theirs:
             yield from _changes(name, mine, theirs)
+
+
+def list_changes(differing: Iterable[Change]) -> str:
+    """Say what differs, the first few things of many."""
+    each = [str(change) for change in differing]
+    more = [f"and {len(each) - _TOLD} more"] if len(each) > _TOLD else []
+    return "; ".join([*each[:_TOLD], *more])
 
 
 def what_changed(differing: Iterable[Change], noun: str) -> str:

@@ -10,9 +10,8 @@ from math import pi
 
 from workers.controllers.end_effector import EndEffectorWaypoints, WaypointRanges
 from workers.environments.drive import TorqueDrive
-from workers.environments.environment import Environment
 from workers.environments.tabletop import CylinderModel, Tabletop, TabletopModel
-from workers.mujoco import extra
+from workers.setups.engines import in_mujoco
 from workers.setups.setup import Setup
 from workers.simulation.arm import UNLIMITED, ArmModel
 from workers.tasks.stable_push import StablePush
@@ -74,14 +73,7 @@ def franka_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    extra.require_installed()
-    return replace(_pushing("franka-mujoco", MODEL), build=_open_in_mujoco, packages=extra.PACKAGES)
-
-
-def _open_in_mujoco() -> Environment:
-    from workers.environments.mujoco_tabletop import MujocoTabletop  # it takes a second
-
-    return MujocoTabletop(MODEL)
+    return in_mujoco(franka(), MODEL)
 
 
 def franka_rehearsal() -> Setup:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from workers.controllers.joint_speed import JointSpeedWaypoints
 from workers.environments.drive import SpeedDrive
-from workers.environments.environment import Environment
 from workers.environments.tabletop import CylinderModel, Tabletop, TabletopModel
-from workers.mujoco import extra
+from workers.setups.engines import in_mujoco
 from workers.setups.setup import Setup
 from workers.simulation.arm import UNLIMITED, ArmModel
 from workers.tasks.stable_push import StablePush
@@ -67,14 +66,7 @@ def yumi_mujoco() -> Setup:
     Raises:
         MissingExtraError: MuJoCo is not installed.
     """
-    extra.require_installed()
-    return replace(_pushing("yumi-mujoco", SHARE), build=_open_in_mujoco, packages=extra.PACKAGES)
-
-
-def _open_in_mujoco() -> Environment:
-    from workers.environments.mujoco_tabletop import MujocoTabletop  # it takes a second
-
-    return MujocoTabletop(_scene(SHARE))
+    return in_mujoco(yumi(), _scene(SHARE))
 
 
 def yumi_rehearsal() -> Setup:

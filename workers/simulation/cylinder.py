@@ -6,6 +6,21 @@ from workers.simulation.world import World
 _MARGIN = 1e-3  # m; Bullet keeps this gap, so a body set down without it jumps
 
 
+def moments(mass: float, radius: float, height: float) -> tuple[float, float, float]:
+    """Principal moments of inertia of a solid cylinder about its centre.
+
+    Args:
+        mass: in kg.
+        radius: in m.
+        height: in m, along z.
+
+    Returns:
+        About x, y and z, in kg·m².
+    """
+    across = mass * (3 * radius**2 + height**2) / 12
+    return across, across, mass * radius**2 / 2
+
+
 class Cylinder:
     """A free cylinder, upright at its start pose after `reset`.
 
@@ -39,12 +54,11 @@ class Cylinder:
             rolling_friction: coefficient of rolling.
             restitution: share of the speed kept in a bounce.
         """
-        across = mass * (3 * self._radius**2 + self._height**2) / 12
         pybullet.changeDynamics(
             self.body,
             -1,
             mass=mass,
-            localInertiaDiagonal=(across, across, mass * self._radius**2 / 2),
+            localInertiaDiagonal=moments(mass, self._radius, self._height),
             lateralFriction=friction,
             rollingFriction=rolling_friction,
             restitution=restitution,

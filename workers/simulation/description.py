@@ -5,7 +5,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,33 @@ _PREFIX = re.compile(r"b3\w+\[[^\]]*\]:\s*")
 def robot_path(urdf: Path | str) -> Path:
     """Where a robot's URDF file is: below the folder of robots that ships with PyBullet, or absolute."""
     return Path(pybullet_data.getDataPath()) / urdf
+
+
+def require_description(path: Path) -> None:
+    """Refuse to go on without a robot's file.
+
+    Raises:
+        FileNotFoundError: there is no such file; the error names those beside it.
+    """
+    if not path.is_file():
+        there = ", ".join(sorted(each.name for each in path.parent.glob("*.urdf"))) or "no *.urdf"
+        raise FileNotFoundError(f"there is no robot description {path}; the folder holds {there}")
+
+
+def require_joints(found: Collection[str], described: object, needed: Iterable[str]) -> None:
+    """Refuse a robot that lacks a joint.
+
+    Args:
+        found: names of its joints.
+        described: the file, for the error.
+        needed: joints that it must have.
+
+    Raises:
+        ValueError: one of them is missing; the error names it, and all that there are.
+    """
+    missing = [name for name in needed if name not in found]
+    if missing:
+        raise ValueError(f"{described} has no joint {missing[0]!r}; it has {', '.join(found) or 'none'}")
 
 
 def load_robot(path: Path, client: int, **options: Any) -> int:
@@ -37,9 +64,7 @@ def load_robot(path: Path, client: int, **options: Any) -> int:
         FileNotFoundError: there is no such file; the error names those beside it.
         ValueError: Bullet cannot load it; the error says why.
     """
-    if not path.is_file():
-        there = ", ".join(sorted(each.name for each in path.parent.glob("*.urdf"))) or "no *.urdf"
-        raise FileNotFoundError(f"there is no robot description {path}; the folder holds {there}")
+    require_description(path)
 
     def load() -> int:
         return pybullet.loadURDF(str(path), physicsClientId=client, **options)
@@ -72,9 +97,7 @@ def joint_indices(body: int, client: int, described: object, needed: Sequence[st
     count = pybullet.getNumJoints(body, physicsClientId=client)
     infos = (pybullet.getJointInfo(body, index, physicsClientId=client) for index in range(count))
     found = {info[1].decode(): info[0] for info in infos}
-    missing = [name for name in needed if name not in found]
-    if missing:
-        raise ValueError(f"{described} has no joint {missing[0]!r}; it has {', '.join(found) or 'none'}")
+    require_joints(found, described, needed)
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import UInt8, UInt16
 
 from workers.simulation.bullet import pybullet
-from workers.simulation.description import robot_path
+from workers.simulation.description import require_joints, robot_path
 from workers.simulation.scenery import Camera
 from workers.simulation.server import Server
 from workers.simulation.shapes import Surface
@@ -52,9 +52,7 @@ class Scene(Server):
         """
         body = self._load(urdf)
         index = self._joint_indices(body)
-        missing = [name for name in joints if name not in index]
-        if missing:
-            raise ValueError(f"the robot has no joint {missing[0]!r}; it has {', '.join(index)}")
+        require_joints(index, "the robot", joints)
         self._joints[body] = [index[name] for name in joints]
         return body
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workers.attempts import Attempts
-from workers.collection.twins import require_comparable, twins
+from workers.collection.twins import outcomes, require_comparable, twins
 from workers.episode import FAILED
 
 
@@ -65,3 +65,13 @@ def test_setups_with_other_controllers_or_physics_are_refused(own_robot):
     require_comparable(robot, calm, "mass=1:2")
     with pytest.raises(LookupError, match=r"wde.*did you mean 'wide'"):
         require_comparable(robot, robot, "wde")
+
+
+def test_outcomes_are_the_shares_of_bad_steps_by_condition(own_robot):
+    robot = own_robot(("> 0.5", "> 0.1"), name="cautious_glider")
+    episodes = [pair.one for pair in pairs(robot, robot)]
+    found = outcomes(robot, episodes)
+    assert found["f"].tolist() == [episode.f for episode in episodes]
+    assert found["bad"].keys() == {"too_fast"}
+    assert found["bad"]["too_fast"] == pytest.approx(found["y"])  # the only condition
+    assert 0.0 < found["y"].mean() < 1.0

@@ -11,7 +11,7 @@ from workers.dataset import schema, shards
 from workers.dataset.cache import training_cache
 from workers.dataset.folder import MANIFEST, create, open_dataset
 from workers.dataset.identity import Identity, identity_of
-from workers.dataset.repeats import error_bounds, irreducible, share
+from workers.dataset.repeats import Irreducible, error_bounds, irreducible, share
 from workers.dataset.shards import Shard
 from workers.dataset.verification import verify
 from workers.rollout import random_episode
@@ -144,3 +144,10 @@ def test_a_setups_identity_takes_the_repeats_asked_for():
     identity = identity_of(setups.load("franka"), seed=1, episodes_per_shard=256, repeats=4)
     assert identity.repeats == 4
     assert '"repeats":4' in identity.to_json()
+
+
+@pytest.mark.parametrize(("y", "f", "count"), [(0.2, 0.5, 0), (0.6, 0.1, 1), (0.1, 0.6, 1), (np.nan, 0.6, 1)])
+def test_more_than_half_that_no_controller_decides_is_told_with_the_remedy(y, f, count):
+    notes = Irreducible(controllers=9, y=y, f=f, xi=(0.1, 0.2)).notes
+    assert len(notes) == count
+    assert all("narrow the ranges of physics" in note for note in notes)

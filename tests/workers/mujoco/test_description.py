@@ -2,7 +2,7 @@
 
 import pytest
 
-from workers.mujoco.description import child_links, compile_scene, read_robot, require_joints
+from workers.mujoco.description import child_links, compile_scene, read_robot
 
 INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
 LINK = '<link name="{}"><inertial><mass value="1"/>' + INERTIA + "</inertial>{}</link>"
@@ -54,9 +54,3 @@ def test_a_description_that_mujoco_does_not_take_is_refused_with_its_words_and_t
     path.write_text(source)
     with pytest.raises(ValueError, match=rf"MuJoCo does not take .*robot\.urdf: .*{reason}.*must exist"):
         compile_scene(read_robot(path), path)
-
-
-def test_a_joint_that_is_missing_is_named_with_those_there_are(path):
-    path.write_text(text())
-    with pytest.raises(ValueError, match="has no joint 'elbow'; it has wrist"):
-        require_joints(read_robot(path), path, ("wrist", "elbow"))

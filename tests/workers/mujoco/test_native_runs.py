@@ -42,3 +42,15 @@ def test_a_command_without_a_plan_is_followed_step_by_step(setup):
         command = setup.controller.start(x, environment, 50)
         found = np.asarray(environment.run_commands(lambda step: command(step), 50))
     assert expected.tobytes() == found.tobytes()
+
+
+def test_a_part_of_a_plan_is_run_like_the_whole(setup):
+    x, physics = draw(setup, 3, 1)
+    with setup.open() as environment:
+        runs = []
+        for horizon, steps in ((50, 50), (50, 20)):
+            environment.reset(physics)
+            command = setup.controller.start(x, environment, horizon)
+            runs.append(environment.run_commands(command, steps))
+    whole, part = runs
+    assert part.tobytes() == whole[:20].tobytes()

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from workers import setups
 from workers.physics import PhysicsRanges
-from workers.setups.declared import changes, declaration, what_changed
+from workers.setups.declared import changes, declaration, list_changes, what_changed
 
 FRANKA = setups.load("franka")
 
@@ -53,3 +53,11 @@ def test_another_order_is_a_difference():
 def test_long_values_are_cut():
     [change] = changes({"conditions": ["x" * 100]}, {"conditions": []})
     assert len(change.one) == 80
+
+
+def test_of_many_differences_the_first_few_are_told_and_the_rest_counted():
+    many = list(changes(declaration(FRANKA), declaration(setups.load("yumi"))))
+    assert list_changes(many).endswith(f"; and {len(many) - 4} more")
+    assert list_changes(many).count(";") == 4
+    assert list_changes(many[:2]) == "; ".join(map(str, many[:2]))
+    assert list_changes([]) == ""
