@@ -29,8 +29,8 @@ AsJson = Annotated[
         "--json",
         help="Print one JSON document, and nothing else, on standard output: folder, setup, episodes, "
         "shards, bytes, horizon, control_step (s), channels, parameters, storage, seed, repeats, bad, "
-        "identity, fingerprint, pybullet, numpy and further packages by name, put_aside, statistics (null without episodes), irreducible "
-        "(null without repeats), notes. What has no number is null.",
+        "identity, fingerprint, pybullet, numpy and further packages by name, put_aside, statistics (null "
+        "without episodes), irreducible (null without repeats), notes. What has no number is null.",
     ),
 ]
 
