@@ -42,7 +42,8 @@ def plain_loop(seconds):
         "        count += 1\n"
         "print(count)"
     )
-    return float(subprocess.check_output([sys.executable, "-c", code, str(seconds)], text=True)) / seconds
+    printed = subprocess.check_output([sys.executable, "-c", code, str(seconds)], encoding="utf-8")
+    return float(printed) / seconds
 
 
 def rates(folder, threads, seconds, cores):
@@ -50,7 +51,7 @@ def rates(folder, threads, seconds, cores):
     model = Path(tempfile.mkdtemp(dir=folder))
     command = [SVAEDC, "train", "--dataset", str(folder / "data"), "--model", str(model / "model")]
     command += ["--set", "train.updates=100000", *threads]
-    process = subprocess.Popen(command, cwd=model, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, cwd=model, stderr=subprocess.PIPE, encoding="utf-8")
     lines = ((time.monotonic(), COUNT.search(line)) for line in process.stderr)
     counts = ((moment, int(found[1])) for moment, found in lines if found)
     quiet = _rate(counts, seconds)
