@@ -55,6 +55,9 @@ _EPISODES: Final[Mapping[str, _Episode]] = MappingProxyType(
         "daisy-27d": _Episode(0.359, 75_000),
         "daisy-11d": _Episode(0.562, 117_500),
         "daisy-11d-rehearsal": _Episode(0.251, 45_800),
+        "franka-mujoco": _Episode(0.006, 23_800),
+        "yumi-mujoco": _Episode(0.011, 25_100),
+        "daisy-27d-mujoco": _Episode(0.058, 75_000),
     }
 )
 _SUGGESTIONS: Final[Mapping[str, float]] = MappingProxyType(

@@ -1,6 +1,6 @@
 """The figures of the paper as recipes: which data, which model, which comparisons, and what was claimed.
 
-A further figure is one entry here. Sections are those of the paper.
+A further figure is one entry here; those asked again in MuJoCo are made from the paper's. Sections are those of the paper.
 """
 
 import difflib
@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 from cluster.reproduction.recipe import THIRTY, Panel, Recipe
+from cluster.reproduction.transfer import in_other_engine
 from svaedc.analysis.evidence import Claim, MedianGap, Steadier, Successes
 from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
 
@@ -226,7 +227,12 @@ _RECIPES = (
         ),
     ),
 )
-RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType({recipe.figure: recipe for recipe in _RECIPES})
+_FIGURES = {recipe.figure: recipe for recipe in _RECIPES}
+_TRANSFERS = (("figure-5", "walk"), ("figure-8", "push"), ("figure-9", "left"))
+RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
+    _FIGURES
+    | {each.figure: each for each in (in_other_engine(_FIGURES[name], panel) for name, panel in _TRANSFERS)}
+)
 
 
 def recipe(figure: str) -> Recipe:

@@ -6,6 +6,7 @@ from cluster.reproduction.cost import comparing, training
 from cluster.reproduction.paper_figures import RECIPES, recipe
 from cluster.reproduction.plan import SCALES, scale
 from cluster.reproduction.recipe import Panel, Recipe
+from cluster.reproduction.transfer import in_other_engine
 from svaedc.analysis.evidence import Claim, MedianGap
 from svaedc.analysis.paired_evidence import Gain
 from svaedc.bo import methods
@@ -37,6 +38,22 @@ def test_the_franka_figure_has_a_panel_of_each_kind():
     assert {"matern", "svae-matern", "svae-dc-matern"} <= set(right.methods)
 
 
+@pytest.mark.parametrize("figure", ["figure-5", "figure-8", "figure-9"])
+def test_a_figure_is_asked_again_of_robots_in_another_engine_with_its_own_model_methods_and_runs(figure):
+    paper, again = RECIPES[figure], RECIPES[f"{figure}-mujoco"]
+    [panel], first = again.panels, paper.panels[0]
+    assert (again.data, again.runs) == (paper.data, paper.runs)
+    assert (panel.methods, panel.trials, panel.latent) == (first.methods, first.trials, first.latent)
+    assert (panel.setup, panel.gap) == (f"{first.setup}-mujoco", "wide")
+    assert again.claims
+    assert set(again.claims) <= set(paper.claims)
+
+
+def test_a_panel_that_a_figure_lacks_is_not_asked_of_another_engine():
+    with pytest.raises(LookupError, match="figure-9 has no panel 'centre'; there are left, middle, right"):
+        in_other_engine(RECIPES["figure-9"], "centre")
+
+
 def test_gaps_are_measured_from_the_optima_of_the_formulas_in_parts_of_their_ranges():
     claims = RECIPES["figure-13"].claims
     gaps = [e for claim in claims for e in claim.evidence if isinstance(e, MedianGap)]
@@ -56,7 +73,11 @@ def test_a_panel_names_what_exists_and_can_be_billed(each, panel):
     assert comparing(panel.setup, panel.methods, dict.fromkeys(panel.methods, 1.0), 22, 2).seconds > 0
     if panel.latent:
         assert panel.latent in LATENT_SIZES
-        assert each.data in (panel.setup, robots.stands_in_for(panel.setup))
+        assert each.data in (
+            panel.setup,
+            robots.stands_in_for(panel.setup),
+            panel.setup.removesuffix("-mujoco"),
+        )
         assert setup.dimensions == setups.load(each.data).dimensions
         for size in SCALES.values():
             assert size.episodes[each.data] >= 10_000
