@@ -62,9 +62,9 @@ def reproduce(
     It says first what that costs. It may be interrupted: the same command goes on, and keeps what is done.
     Figures 4 and 7 need robots: here simulated stand-ins take their place, and are called so everywhere.
 
-    figure-5-mujoco, figure-8-mujoco and figure-9-mujoco ask the same of robots in another engine, MuJoCo, with
-    the model of figures 5, 8 and 9 (its left panel): how much carries over to a robot that is not the
-    simulation.
+    figure-5-mujoco, figure-8-mujoco and figure-9-mujoco ask the same of robots in another engine, MuJoCo,
+    with the model of figures 5, 8 and 9 (its left panel): what carries over to a robot that is not the
+    simulation?
 
     Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
     `svaedc reproduce figure-7 --runs 50`

@@ -1,6 +1,7 @@
 """The figures of the paper as recipes: which data, which model, which comparisons, and what was claimed.
 
-A further figure is one entry here; those asked again in MuJoCo are made from the paper's. Sections are those of the paper.
+A further figure is one entry here; those asked again in MuJoCo are made from the paper's. Sections are
+those of the paper.
 """
 
 import difflib
