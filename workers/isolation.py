@@ -5,6 +5,7 @@ import os
 import threading
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -82,7 +83,9 @@ class IsolatedAttempts(SafeRollouts):
 
 
 def _require_as_named(setup: Setup) -> None:
-    own, named = declaration(setup), declaration(with_bad(load(setup.name), setup.task.bad_name))
+    # Physics are given to every episode, whatever range they were drawn from.
+    loaded = replace(with_bad(load(setup.name), setup.task.bad_name), physics=setup.physics)
+    own, named = declaration(setup), declaration(loaded)
     if own != named:
         raise ValueError(
             f"a child process loads {setup.name!r} by its name, which must give the same setup; they differ "

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from workers.controllers.controller import Command, unit_cube
+from workers.draws import Draws
 from workers.environments.environment import Channel, Environment, Observed, check_observed
 from workers.episode import DIVERGED, FAILED, Episode, Failure, Stored, degrees
 from workers.physics import Physics
-from workers.randomness import Stream, generator
 from workers.setups import Setup
 from workers.tasks.stop import STOPPED, never
 from workers.tasks.task import Bad, check_bad
@@ -73,8 +73,7 @@ def draw(setup: Setup, seed: int, index: int, repeats: int = 1) -> tuple[Float32
     Returns:
         The controller, [D], in [0, 1], and the physics.
     """
-    x = generator(seed, Stream.CONTROLLER, index // repeats).random(setup.dimensions, dtype=np.float32)
-    return x, setup.physics.draw(generator(seed, Stream.PHYSICS, index))
+    return Draws(seed, repeats).episode(setup, index)
 
 
 def random_episode(

@@ -24,6 +24,15 @@ def collect(
     repeats: Annotated[
         int, typer.Option("--repeats", min=1, help="Episodes of each controller, each under other physics.")
     ] = 1,
+    gap: Annotated[
+        str,
+        typer.Option(
+            "--gap",
+            metavar="LEVEL",
+            help="Physics of another level than data collection's: paper, training, wide, or "
+            "NAME=LOW:HIGH,NAME=VALUE.",
+        ),
+    ] = "",
     bad: Annotated[
         str,
         typer.Option("--bad", metavar="MODULE:FUNCTION", help="G_bad of your own instead of the setup's."),
@@ -52,6 +61,7 @@ def collect(
         folder=dataset,
         seed=seed,
         repeats=repeats,
+        gap=gap,
         settings=settings.collect,
     )
     if not missing.missing and not plan:

@@ -7,7 +7,16 @@ from typing import Annotated, Any
 import typer
 
 from cluster.cli.documents import one_document
-from cluster.cli.options import Address, Config, Overrides, SetupName, TrainedModel, services, settings_of
+from cluster.cli.options import (
+    Address,
+    Config,
+    Overrides,
+    SetupName,
+    SimulatedCandidates,
+    TrainedModel,
+    services,
+    settings_of,
+)
 from cluster.inputs import durable, setup_of
 
 Report = Annotated[
@@ -46,6 +55,7 @@ def compare(
         str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
     ] = "paper",
     model: TrainedModel = None,
+    candidates: SimulatedCandidates = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -73,6 +83,7 @@ def compare(
             trials=trials,
             gap=gap,
             model=model,
+            candidates=candidates,
             folder=out,
             settings=settings.compare,
         )

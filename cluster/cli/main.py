@@ -10,6 +10,7 @@ import typer
 from typer.exceptions import TyperException
 
 from cluster.cli import dataset, hardware, setups
+from cluster.cli.candidates import candidates
 from cluster.cli.check import check
 from cluster.cli.collect import collect
 from cluster.cli.compare import compare
@@ -30,14 +31,14 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Learn robot controllers in ten trials: simulate many, learn a latent space of their trajectories "
     "that is compressed where they behave badly, and run Bayesian optimisation there.\n\n"
-    "A first look: `svaedc demo`. The steps on their own: `check`, `collect`, `train`, `compare`, "
-    "`hardware`; `render` shows an episode, `reproduce` makes a figure of the paper; `setups`, `methods` and "
-    "`robots` list what there is. "
+    "A first look: `svaedc demo`. The steps on their own: `check`, `collect`, `train`, `candidates`, "
+    "`compare`, `hardware`; `render` shows an episode, `reproduce` makes a figure of the paper; `setups`, "
+    "`methods` and `robots` list what there is. "
     "Every long command may be interrupted and started again: it goes on where it was.",
 )
 
 
-for _command in (demo, check, collect, train, compare, ui, render, reproduce, methods, robots):
+for _command in (demo, check, collect, train, candidates, compare, ui, render, reproduce, methods, robots):
     app.command()(_command)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(hardware.app, name="hardware")

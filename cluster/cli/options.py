@@ -55,6 +55,14 @@ ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.
 TrainedModel = Annotated[
     Path | None, typer.Option("--model", help="Folder of a trained model.", callback=durable)
 ]
+SimulatedCandidates = Annotated[
+    Path | None,
+    typer.Option(
+        "--candidates",
+        help="Folder of candidates that `svaedc candidates` simulated; all runs choose among them.",
+        callback=durable,
+    ),
+]
 
 
 def settings_of(config: Path | None, overrides: list[str] | None) -> "Settings":

@@ -22,6 +22,8 @@ DECLARED = "setup_declares"
 """Of a user's own setup, a comparison also knows what it declared, to say what has changed."""
 CODES = "method_digests"
 """It also knows the code of users' own methods, of those that it has runs of."""
+CANDIDATES, NO_CANDIDATES = "candidates", "none"
+"""It knows the SHA-256 of the table of candidates that its runs choose among."""
 NO_CODES: Final[Mapping[str, str]] = MappingProxyType({})
 TABLE = "trials.parquet"
 SUMMARY = "summary.json"
@@ -244,7 +246,7 @@ class ComparisonFolder:
         path = self.path / IDENTITY
         try:
             # Comparisons of before lack the digest, and what a user's setup declared.
-            later: dict[str, Any] = {"setup_digest": "", DECLARED: None, CODES: {}}
+            later: dict[str, Any] = {"setup_digest": "", DECLARED: None, CODES: {}, CANDIDATES: NO_CANDIDATES}
             found = {**later, **json.loads(path.read_text(encoding="utf-8"))}
             return {name: found[name] for name in (*expected, "model", CODES)}
         except FileNotFoundError as error:

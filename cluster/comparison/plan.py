@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cluster.comparison.folder import DECLARED, ComparisonFolder
+from cluster.comparison.folder import CANDIDATES, DECLARED, NO_CANDIDATES, ComparisonFolder
 from cluster.comparison.records import RunKey, Runs
 from cluster.comparison.worker import ComparisonJob
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
 from cluster.inputs import usage_errors
 from cluster.optimization import methods
+from cluster.optimization.candidates import TABLE, require_usable
 from cluster.optimization.models import trained_model
 from cluster.progress import say
 from svaedc.analysis.seeds import common_purpose
@@ -59,12 +60,22 @@ class Grid:
         """The methods that need a trained model."""
         return [name for name in self.methods if methods.needs_model(name)]
 
-    def require(self, model: Path | None) -> None:
-        """Refuse methods that lack their model.
+    def require(self, model: Path | None, candidates: Path | None) -> None:
+        """Refuse methods that lack their model, or their candidates.
+
+        Args:
+            model: folder of a trained one; None for none.
+            candidates: folder of simulated ones; None for none.
 
         Raises:
-            UsageError: a method needs a model, and there is none.
+            UsageError: a method needs what there is none of.
         """
+        simulated = [name for name in self.methods if methods.needs_candidates(name)]
+        if simulated and candidates is None:
+            raise UsageError(
+                f"{', '.join(simulated)} need candidates that were simulated: make some with "
+                "`svaedc candidates` and name their folder with --candidates"
+            )
         if self.with_model() and model is None:
             raise UsageError(
                 f"{', '.join(self.with_model())} need a trained model: name its folder with --model"
@@ -111,6 +122,7 @@ class ComparisonPlan:
         trained_on: the setup of the model's data where it is another one; "" elsewhere.
         slots: runs at a time.
         caption: of figure and page, before what they say themselves.
+        candidates: SHA-256 of the table of candidates; `NO_CANDIDATES` for none.
     """
 
     setup: Setup
@@ -120,6 +132,7 @@ class ComparisonPlan:
     trained_on: str
     slots: int
     caption: str
+    candidates: str = NO_CANDIDATES
 
     @property
     def identity(self) -> Mapping[str, Any]:
@@ -131,6 +144,7 @@ class ComparisonPlan:
             "pool_size": self.job.pool_size,
             "initial_trials": self.job.initial,
             "rollout_version": VERSION,
+            CANDIDATES: self.candidates,
             **({DECLARED: declaration(self.setup)} if self.setup.code else {}),
         }
 
@@ -192,6 +206,7 @@ def plan_comparison(
     folder: Path,
     settings: CompareSettings,
     caption: str = "",
+    candidates: Path | None = None,
 ) -> ComparisonPlan:
     """Check what is to be compared, before anything is written.
 
@@ -204,6 +219,7 @@ def plan_comparison(
         folder: of the results.
         settings: of the runs.
         caption: of figure and page, before what they say themselves.
+        candidates: folder of simulated ones, which all runs choose among; None where each draws its own.
 
     Returns:
         A comparison that can be run.
@@ -215,7 +231,8 @@ def plan_comparison(
     """
     with usage_errors():
         setup.gap(gap)
-    grid.require(model)
+    grid.require(model, candidates)
+    table = candidates / TABLE if candidates is not None else None
     path, trained_on = usable(model, setup) if grid.with_model() and model else (None, setup.name)
     job = ComparisonJob(
         folder=ComparisonFolder(folder.resolve()),
@@ -226,7 +243,10 @@ def plan_comparison(
         initial=settings.initial_trials,
         trials=trials,
         episode_timeout=settings.episode_timeout_seconds,
+        candidates=str(table.resolve()) if table is not None else "",
     )
+    if table is not None:
+        require_usable(table, setup, path)
     try:
         job.require(grid.methods, setup)
     except LookupError as error:
@@ -241,6 +261,7 @@ def plan_comparison(
         trained_on=trained_on if trained_on != setup.name else "",
         slots=settings.slots,
         caption=caption,
+        candidates=sha256(table) if table is not None else NO_CANDIDATES,
     )
 
 

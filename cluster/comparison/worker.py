@@ -15,6 +15,7 @@ from cluster.comparison.records import RunKey
 from cluster.comparison.robot import HiddenRobot, safe_attempts
 from cluster.files import DISK_ERRORS
 from cluster.optimization import methods
+from cluster.optimization.candidates import shared_candidates
 from cluster.optimization.factory import Optimization, hidden_physics
 from cluster.optimization.models import shared_model
 from svaedc.bo.loop import Trial, trials
@@ -40,6 +41,7 @@ class ComparisonJob:
         initial: random trials that all methods of a seed share.
         trials: suggested trials after them.
         episode_timeout: longest duration of a trial, in s.
+        candidates: file of simulated candidates that all runs choose among; "" for none.
     """
 
     folder: ComparisonFolder
@@ -50,6 +52,7 @@ class ComparisonJob:
     initial: int
     trials: int
     episode_timeout: float = TIMEOUT_SECONDS
+    candidates: str = ""
 
     @property
     def length(self) -> int:
@@ -109,7 +112,8 @@ class ComparisonJob:
         needs_model = methods.needs_model(key.method)
         twin = robots.stands_in_for(self.setup)
         model = shared_model(Path(self.model), self.setup, twin) if needs_model else None
-        return Optimization(setup, key.method, key.run, self.pool_size, model)
+        candidates = shared_candidates(Path(self.candidates)) if self.candidates else None
+        return Optimization(setup, key.method, key.run, self.pool_size, model, candidates=candidates)
 
 
 class RunTrainable(tune.Trainable):

@@ -4,15 +4,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float32
+
 from cluster.config import CollectSettings
 from cluster.datasets.quarantine import release
 from cluster.errors import UserError
+from cluster.inputs import usage_errors
 from cluster.progress import say
 from workers.dataset import shards
+from workers.dataset.chosen import chosen_digest
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location
+from workers.draws import EPISODE
 from workers.setups import Setup
 
 
@@ -46,6 +52,7 @@ class CollectionPlan:
             "episodes": self.episodes,
             "seed": identity.seed,
             "repeats": identity.repeats,
+            "gap": identity.gap,
             "bad": identity.bad_name,
             "actors": actors,
             "identity": identity.digest[:12],
@@ -54,7 +61,16 @@ class CollectionPlan:
 
 
 def plan_collection(
-    *, setup: Setup, episodes: int, folder: Location, seed: int, repeats: int = 1, settings: CollectSettings
+    *,
+    setup: Setup,
+    episodes: int,
+    folder: Location,
+    seed: int,
+    settings: CollectSettings,
+    repeats: int = 1,
+    gap: str = "",
+    physics_of: str = EPISODE,
+    chosen: Float32[np.ndarray, "c d"] | None = None,
 ) -> CollectionPlan:
     """The dataset in a folder, begun if need be, and the shards that are missing in it.
 
@@ -63,24 +79,33 @@ def plan_collection(
         episodes: that the dataset shall hold.
         folder: of the dataset.
         seed: of all controllers and physics.
-        repeats: episodes of each controller.
         settings: of the collection.
+        repeats: episodes of each controller.
+        gap: level of hidden physics that they are drawn from, or its ranges; "" for those of data collection.
+        physics_of: one of `workers.draws.PHYSICS_OF`, what has physics of its own.
+        chosen: controllers that come first; None where all are drawn.
 
     Returns:
         The plan; it is empty for a dataset that is whole.
 
     Raises:
+        UsageError: the setup has no such gap.
         UserError: the folder holds another dataset, or cannot be written.
     """
+    with usage_errors():
+        under = setup.under(gap)
     identity = identity_of(
-        setup,
+        under,
         seed=seed,
         episodes_per_shard=settings.episodes_per_shard,
         repeats=repeats,
         storage=settings.storage,
+        gap=gap,
+        physics_of=physics_of,
+        chosen="" if chosen is None else chosen_digest(chosen),
     )
     try:
-        dataset = create(folder, identity)
+        dataset = create(folder, identity, chosen)
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     swept = shards.sweep(folder)

@@ -77,7 +77,8 @@ def _broken_shards(dataset: Dataset) -> list[Shard]:
 
 def _setup_of(dataset: Dataset) -> Setup:
     """The dataset's setup, if it still rolls out the same episodes here."""
-    setup = setup_of(dataset.identity.setup, dataset.identity.bad_name)
+    identity = dataset.identity
+    setup = setup_of(identity.setup, identity.bad_name).under(identity.gap)
     try:
         require_same_code(setup, dataset)
     except ValueError as error:

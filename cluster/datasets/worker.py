@@ -24,9 +24,10 @@ class RolloutActor:
 
     def __init__(self, setup: str, folder: str, episode_timeout: float) -> None:
         self._dataset = open_dataset(location(folder))
-        self._setup = with_bad(setups.load(setup), self._dataset.identity.bad_name)
+        identity = self._dataset.identity
+        self._setup = with_bad(setups.load(setup), identity.bad_name).under(identity.gap)
         require_same_code(self._setup, self._dataset)
-        require_working(self._setup, self._dataset.identity.seed)
+        require_working(self._setup, identity.seed)
         self._timeout = episode_timeout
         sweep(self._dataset.folder)  # what processes of this machine left, which no other can tell dead
 

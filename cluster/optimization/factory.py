@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float32
 
 from cluster.optimization import methods
+from cluster.optimization.candidates import CandidateTable
 from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities
 from svaedc.bo.features import Latents
@@ -38,6 +39,7 @@ class Optimization:
         pool_size: controllers that a method with a pool may choose from.
         model: in evaluation mode, its parameters frozen; None for methods that need none.
         draws: version of how controllers are drawn.
+        candidates: simulated ones, which the run chooses among; None where its pool is drawn.
     """
 
     setup: Setup
@@ -46,6 +48,7 @@ class Optimization:
     pool_size: int
     model: SvaeDc | None = None
     draws: int = DRAWS
+    candidates: CandidateTable | None = None
 
     def initial(self, index: int) -> Float32[np.ndarray, " D"]:
         """The random controller of one of the first trials, which all methods of a seed share.
@@ -54,8 +57,11 @@ class Optimization:
             index: of the trial, from 0.
 
         Returns:
-            A point of the unit cube, [D].
+            A point of the unit cube, [D]; one of the candidates that were drawn, where there are candidates.
         """
+        if self.candidates is not None:
+            drawn = self.candidates.drawn()
+            return drawn[generator(self.seed, Stream.INITIAL, 0).permutation(len(drawn))[index]]
         return self._uniform(generator(self.seed, Stream.INITIAL, index), (self.setup.dimensions,))
 
     def rng(self, index: int) -> np.random.Generator:
@@ -64,18 +70,32 @@ class Optimization:
 
     def problem(self) -> Problem:
         """What methods are built for: the pool, and what the model says of it where the method needs one."""
-        shape = (self.pool_size, self.setup.dimensions)
-        pool = self._uniform(generator(self.seed, Stream.POOL, 0), shape)
-        if self.model is None or not methods.needs_model(self.method):
-            return Problem(self.setup.dimensions, self.setup.objective_limits, pool)
-        return Problem(
+        pool, candidates = self._pool(), self.candidates
+        problem = Problem(
             self.setup.dimensions,
             self.setup.objective_limits,
             pool,
-            Latents.of(torch.from_numpy(pool), self.model.latent_means),
-            Densities.of(self.model),
-            Adjustable(self.model),
+            simulated=candidates.simulated() if candidates else None,
         )
+        if self.model is None or not methods.needs_model(self.method):
+            return problem
+        learnt = Latents.of(torch.from_numpy(pool), self.model.latent_means)
+        return replace(
+            problem,
+            latents=(candidates.latents(pool) if candidates else None) or learnt,
+            densities=Densities.of(self.model),
+            adjustable=Adjustable(self.model),
+        )
+
+    def _pool(self) -> Float32[np.ndarray, "n D"]:
+        """Random controllers, or candidates; of more than a pool holds, as many drawn from all."""
+        rng = generator(self.seed, Stream.POOL, 0)
+        if self.candidates is None:
+            return self._uniform(rng, (self.pool_size, self.setup.dimensions))
+        x = self.candidates.x
+        if len(x) <= self.pool_size:
+            return x
+        return x[np.sort(rng.choice(len(x), self.pool_size, replace=False))]
 
     def build(self) -> Method:
         """The method, ready to suggest.

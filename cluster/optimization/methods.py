@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from svaedc.bo.candidates import Problem
     from svaedc.bo.strategies import Method
 
-__all__ = ["KIND", "build", "code", "names", "needs_model", "require"]
+__all__ = ["KIND", "build", "code", "names", "needs_candidates", "needs_model", "require"]
 
 KIND: Final = Kind("method", "svaedc.methods", names())
 
@@ -30,6 +30,17 @@ def needs_model(name: str) -> bool:
         LookupError: There is no such method; the message names the nearest.
     """
     return method_names.needs_model(name) if ships(name) else _own_needs_model(name)
+
+
+def needs_candidates(name: str) -> bool:
+    """Whether a method needs candidates that were simulated; a user's says so as `needs_candidates = True`.
+
+    Raises:
+        LookupError: There is no such method; the message names the nearest.
+    """
+    if ships(name):
+        return method_names.needs_candidates(name)
+    return bool(getattr(_own(name).value, "needs_candidates", False))
 
 
 def build(name: str, problem: "Problem") -> "Method":

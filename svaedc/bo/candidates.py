@@ -15,6 +15,7 @@ from svaedc.bo.distribution_features import Densities, Density
 from svaedc.bo.features import Embedding, Latents
 from svaedc.bo.history import History
 from svaedc.bo.online import Adjustable
+from svaedc.bo.simulated.outcomes import Simulated
 
 Part = TypeVar("Part")
 
@@ -32,6 +33,8 @@ class Problem:
         densities: Its distributions, for the KL kernels.
         adjustable: The model itself, where its last layers are adjusted online.
         largest_y: Controllers predicted worse than this are out of bounds.
+        simulated: How the pool fared in simulation, for methods that use that; the pool is then of simulated
+            controllers alone.
     """
 
     dimensions: int
@@ -41,6 +44,7 @@ class Problem:
     densities: Densities | None = None
     adjustable: Adjustable | None = None
     largest_y: float = 1.0
+    simulated: Simulated | None = None
 
     def __post_init__(self) -> None:
         """Refuses parts that do not belong together."""
@@ -73,6 +77,15 @@ class Problem:
     def known_densities(self) -> Densities:
         """The distributions; without them, a `ValueError`."""
         return _require(self.densities, "densities", "Densities.of(model)")
+
+    def known_simulated(self) -> Simulated:
+        """The simulated outcomes; without them, a `ValueError`."""
+        if self.simulated is None:
+            raise ValueError(
+                "it needs candidates that were simulated, got none: make some with `svaedc candidates`, and "
+                "name their folder with --candidates"
+            )
+        return self.simulated
 
     def known_adjustable(self) -> Adjustable:
         """The model; without one, a `ValueError`."""

@@ -18,7 +18,7 @@ from botorch.settings import validate_input_scaling
 from gpytorch.constraints import GreaterThan, Interval
 from gpytorch.kernels import Kernel, MaternKernel, ScaleKernel
 from gpytorch.likelihoods import GaussianLikelihood
-from gpytorch.means import ConstantMean
+from gpytorch.means import ConstantMean, Mean
 from gpytorch.mlls import ExactMarginalLogLikelihood
 from jaxtyping import Float
 from linear_operator.utils.cholesky import psd_safe_cholesky
@@ -68,15 +68,14 @@ class GaussianProcess:
         (self._trials,) = model.train_inputs
         matrix = model.covar_module(self._trials).to_dense()
         self._factor = psd_safe_cholesky(matrix + model.likelihood.noise * torch.eye(len(matrix)).to(matrix))
-        self._mean = model.mean_module.constant
-        residual = (model.train_targets - self._mean).unsqueeze(-1)
+        residual = (model.train_targets - model.mean_module(self._trials)).unsqueeze(-1)
         self._weights = torch.cholesky_solve(residual, self._factor)
 
     def moments(self, phi: Float[Tensor, "*batch n k"]) -> tuple[Tensor, Tensor]:
         """Mean and standard deviation [*batch, n] of f at each of these features; gradients reach them."""
         k = self.model.covar_module(phi, self._trials).to_dense()
         k_0 = self.model.covar_module(phi, diag=True)
-        mu = self._mean + (k @ self._weights).squeeze(-1)
+        mu = self.model.mean_module(phi) + (k @ self._weights).squeeze(-1)
         explained = torch.linalg.solve_triangular(self._factor, k.mT, upper=False).square().sum(dim=-2)
         sigma = (k_0 - explained).clamp_min(_LEAST_VARIANCE).sqrt()
         return self._offset + self._unit * mu, self._unit * sigma
@@ -99,7 +98,17 @@ def scale_objectives(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Flo
     return (f - low) / (high - low)
 
 
-def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor, " n"]) -> GaussianProcess:
+def constant_mean() -> Mean:
+    """m, between the limits of f; it is fitted."""
+    return ConstantMean(constant_constraint=Interval(0.0, 1.0, initial_value=0.5))
+
+
+def fit(
+    kernel: Callable[[], Kernel],
+    phi: Float[Tensor, "n k"],
+    f: Float[Tensor, " n"],
+    mean: Callable[[], Mean] = constant_mean,
+) -> GaussianProcess:
     """Hyper-parameters of maximum marginal likelihood, and the process with them conditioned on all trials.
 
     Where a fit fails, the last good hyper-parameters serve: those fitted to the longest beginning of the
@@ -110,14 +119,15 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
         kernel: Makes the kernel, with its starting hyper-parameters.
         phi: Features of the trials, float64, of root-mean-square distance near 1.
         f: Objectives, scaled to [0, 1].
+        mean: Makes the mean.
 
     Returns:
         The process, conditioned on all trials; its `event` says what went wrong, if anything did.
     """
-    process = _process(kernel(), phi, f)
+    process = _process(kernel(), mean(), phi, f)
     event = ""
     for count in range(len(f), 0, -1):
-        fitted = _process(kernel(), phi[:count], f[:count])
+        fitted = _process(kernel(), mean(), phi[:count], f[:count])
         try:
             _maximize_likelihood(fitted)
         except (NanError, NotPSDError, ModelFittingError) as error:
@@ -130,8 +140,7 @@ def fit(kernel: Callable[[], Kernel], phi: Float[Tensor, "n k"], f: Float[Tensor
     return GaussianProcess(process, event)
 
 
-def _process(kernel: Kernel, phi: Tensor, f: Tensor) -> SingleTaskGP:
-    mean = ConstantMean(constant_constraint=Interval(0.0, 1.0, initial_value=0.5))
+def _process(kernel: Kernel, mean: Mean, phi: Tensor, f: Tensor) -> SingleTaskGP:
     likelihood = GaussianLikelihood(noise_constraint=GreaterThan(LEAST_NOISE, initial_value=1e-3))
     # BoTorch warns that features are outside the unit cube and objectives not standardised: both are meant.
     with validate_input_scaling(state=False):

@@ -29,16 +29,33 @@ LATENT: Final = {
     "lkl": "by the divergence between the latent paths that the model expects",
 }
 """These need a trained model."""
+SIMULATED: Final = {
+    "simulated-random": "uniform among the candidates that were simulated",
+    "simulated-best": "candidates in the order of their mean simulated objective",
+    "simulated-cautious": "candidates in the order of their mean simulated objective minus its spread",
+    "least-bad": "candidates in the order of their mean simulated badness",
+}
+PRIORS: Final = {
+    "prior-se": "Bayesian optimisation on the controllers, with the simulated objective as prior mean",
+    "prior-svae": "the same on latent paths",
+    "prior-svae-dc": "the same on compressed latent paths",
+    "ensemble-se": "the robot as one more of the simulated worlds, what no world shows on the controllers",
+    "ensemble-svae": "the same on latent paths",
+    "ensemble-svae-dc": "the same on compressed latent paths",
+}
+"""These need candidates that were simulated."""
 VARIANTS: Final = {
     "se-acqf": "se, searched by gradients instead of in a pool",
     "matern-acqf": "matern, searched by gradients instead of in a pool",
 }
-SUMMARIES: Final[Mapping[str, str]] = dict(sorted((RANDOM | CONTROLLERS | LATENT | VARIANTS).items()))
+SUMMARIES: Final[Mapping[str, str]] = dict(
+    sorted((RANDOM | SIMULATED | CONTROLLERS | LATENT | PRIORS | VARIANTS).items())
+)
 """These are the methods of the comparison; most take a search and an acquisition behind their name."""
 SEARCHES: Final = ("pool", "acqf")
 ACQUISITIONS: Final = ("ucb", "ei")
 _OURS, _PRACTITIONERS = ("pool", "ucb"), ("acqf", "ei")
-_DEFAULTS: Final = {name: _OURS for name in CONTROLLERS | LATENT} | {
+_DEFAULTS: Final = {name: _OURS for name in CONTROLLERS | LATENT | PRIORS} | {
     name: _PRACTITIONERS for name in ("botorch", "saasbo", "turbo")
 }
 
@@ -66,7 +83,7 @@ class MethodName:
         """
         base, acquisition = _without_suffix(name, ACQUISITIONS)
         base, search = _without_suffix(base, SEARCHES)
-        if name in RANDOM:
+        if name in RANDOM | SIMULATED:
             return cls(name, "", "")
         if base not in _DEFAULTS:
             raise LookupError(_unknown(name))
@@ -81,13 +98,19 @@ class MethodName:
     @property
     def needs_model(self) -> bool:
         """Whether it needs the latents of a trained model."""
-        return self.base in LATENT or self.base == "screened-random"
+        on_paths = self.base in PRIORS and "svae" in self.base
+        return self.base in LATENT or on_paths or self.base == "screened-random"
+
+    @property
+    def needs_candidates(self) -> bool:
+        """Whether it needs candidates that were simulated."""
+        return self.base in SIMULATED | PRIORS
 
 
 def ships(name: str) -> bool:
     """Whether a name is one of a method that ships, or would be but for a part that its method has anyway."""
     base, _ = _without_suffix(_without_suffix(name, ACQUISITIONS)[0], SEARCHES)
-    return name in RANDOM or base in _DEFAULTS
+    return name in RANDOM | SIMULATED or base in _DEFAULTS
 
 
 def names() -> tuple[str, ...]:
@@ -102,6 +125,15 @@ def needs_model(name: str) -> bool:
         LookupError: No method that ships has this name.
     """
     return MethodName.read(name).needs_model
+
+
+def needs_candidates(name: str) -> bool:
+    """Whether a method needs candidates that were simulated.
+
+    Raises:
+        LookupError: No method that ships has this name.
+    """
+    return MethodName.read(name).needs_candidates
 
 
 def _without_suffix(name: str, suffixes: Collection[str]) -> tuple[str, str]:

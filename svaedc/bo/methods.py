@@ -4,6 +4,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
+import torch
+from torch import Tensor
+
 from svaedc.bo import gp, kernels, surrogates
 from svaedc.bo.acquisition import (
     Acquisition,
@@ -15,8 +18,10 @@ from svaedc.bo.acquisition import (
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
 from svaedc.bo.method_names import MethodName, names, needs_model
+from svaedc.bo.simulated import prior
 from svaedc.bo.strategies import (
     BayesianOptimization,
+    InOrder,
     Method,
     PoolSearch,
     TrustRegionOptimization,
@@ -50,12 +55,30 @@ LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
 }
 """These methods need a trained model."""
 
+SIMULATED_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
+    f"{name}-{features}": partial(surrogate, covariance, kernels.se)
+    for name, covariance in (("prior", prior.Trusted), ("ensemble", prior.Ensemble))
+    for features, surrogate in (
+        ("se", prior.on_controllers),
+        ("svae", prior.on_paths),
+        ("svae-dc", prior.on_compressed_paths),
+    )
+}
+"""These methods need candidates that were simulated."""
+
 _SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
 _ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
-_RANDOM: Final[dict[str, Callable[[Problem], Method]]] = {
+_UNLEARNT: Final[dict[str, Callable[[Problem], Method]]] = {
     "random": lambda problem: UniformSearch(problem.dimensions),
     "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),
+    "simulated-random": lambda problem: _in_simulation(problem, PoolSearch),
+    "simulated-best": lambda problem: _in_order(problem, lambda f, _: f.mean(dim=1)),
+    "simulated-cautious": lambda problem: _in_order(
+        problem, lambda f, _: f.mean(dim=1) - f.std(dim=1, correction=0)
+    ),
+    "least-bad": lambda problem: _in_order(problem, lambda _, y: -y.mean(dim=1)),
 }
+"""Nothing that a trial shows changes what these suggest next."""
 
 
 def build(name: str, problem: Problem) -> Method:
@@ -74,7 +97,7 @@ def build(name: str, problem: Problem) -> Method:
     """
     read = MethodName.read(name)
     try:
-        return _RANDOM[name](problem) if name in _RANDOM else _optimization(read, problem)
+        return _UNLEARNT[name](problem) if name in _UNLEARNT else _optimization(read, problem)
     except ValueError as error:
         raise ValueError(f"method {name!r}: {error}") from error
 
@@ -102,7 +125,7 @@ def require(name: str, problem: Problem, trials: int) -> None:
 
 def _pool_of(method: Method) -> Candidates | None:
     match method:
-        case PoolSearch(candidates):
+        case PoolSearch(candidates) | InOrder(candidates):
             return candidates
         case BayesianOptimization(surrogate, _, OverPool()) | TrustRegionOptimization(
             surrogate, _, OverPool()
@@ -111,9 +134,20 @@ def _pool_of(method: Method) -> Candidates | None:
     return None
 
 
+def _in_order(problem: Problem, score: Callable[[Tensor, Tensor], Tensor]) -> Method:
+    """By a score of the simulated objectives and badnesses [n, e]."""
+    simulated, x = problem.known_simulated(), torch.tensor(problem.pool)
+    return InOrder(as_they_are(problem), score(simulated.objectives(x), simulated.badness(x)))
+
+
+def _in_simulation(problem: Problem, method: Callable[[Candidates], Method]) -> Method:
+    problem.known_simulated()
+    return method(as_they_are(problem))
+
+
 def _optimization(name: MethodName, problem: Problem) -> Method:
     if name.search == "pool" and not len(problem.pool):
         raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
     kind = TrustRegionOptimization if name.base == "turbo" else BayesianOptimization
-    surrogate = (SURROGATES | LATENT_SURROGATES)[name.base](problem)
+    surrogate = (SURROGATES | LATENT_SURROGATES | SIMULATED_SURROGATES)[name.base](problem)
     return kind(surrogate, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])

@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 from torch import Tensor
 
 from svaedc.bo.acquisition import (
@@ -75,6 +75,32 @@ class PoolSearch:
             Candidate, [D].
         """
         return OverPool().anywhere(self.candidates, history, rng)
+
+
+@dataclass(frozen=True, eq=False)
+class InOrder:
+    """One candidate after the other, by a score that no trial changes.
+
+    Attributes:
+        candidates: What may be suggested.
+        scores: Of each; the largest comes first.
+    """
+
+    candidates: Candidates
+    scores: Float[Tensor, " n"]
+
+    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:  # noqa: ARG002
+        """Take the untried candidate of largest score.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Not used.
+
+        Returns:
+            Candidate, [D], a copy.
+        """
+        untried = self.candidates.untried_indices(history)
+        return self.candidates.x[untried[self.scores[untried].argmax()]].copy()
 
 
 @dataclass(frozen=True)

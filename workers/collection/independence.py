@@ -5,9 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from workers.attempts import SafeRollouts
+from workers.draws import Draws
 from workers.episode import UNUSABLE, Episode
 from workers.isolation import IsolatedAttempts
-from workers.rollout import draw, storable
+from workers.rollout import storable
 from workers.setups import Setup
 
 REMEDY = (
@@ -19,8 +20,7 @@ REMEDY = (
 
 def order_dependence(
     setup: Setup,
-    seed: int,
-    repeats: int,
+    draws: Draws,
     start: int,
     episodes: Sequence[Episode],
     attempts: Callable[[Setup], SafeRollouts] = IsolatedAttempts,
@@ -29,8 +29,7 @@ def order_dependence(
 
     Args:
         setup: robot, controller and task.
-        seed: of the dataset.
-        repeats: episodes of each controller.
+        draws: of the dataset.
         start: index of the first episode.
         episodes: as they were, all one after the other.
         attempts: rolls them out; users' code may hang in another order.
@@ -40,18 +39,17 @@ def order_dependence(
     """
     before = dict(enumerate(episodes, start=start))
     with attempts(setup) as trying:
-        return told_dependence(before, ends(setup, seed, repeats, before, trying))
+        return told_dependence(before, ends(setup, draws, before, trying))
 
 
 def ends(
-    setup: Setup, seed: int, repeats: int, episodes: Mapping[int, Episode], attempts: SafeRollouts
+    setup: Setup, draws: Draws, episodes: Mapping[int, Episode], attempts: SafeRollouts
 ) -> dict[int, Episode]:
     """Roll out the first and the last of some episodes, the one right after the other.
 
     Args:
         setup: robot, controller and task.
-        seed: of the dataset.
-        repeats: episodes of each controller.
+        draws: of the dataset.
         episodes: by their index; those that diverged or failed are left out.
         attempts: rolls them out.
 
@@ -60,7 +58,7 @@ def ends(
     """
     chosen = [index for index in dict.fromkeys((min(episodes), max(episodes)))]
     usable = [index for index in chosen if episodes[index].stop not in UNUSABLE]
-    again = attempts.rollouts(draw(setup, seed, index, repeats) for index in usable)
+    again = attempts.rollouts(draws.episode(setup, index) for index in usable)
     return {index: storable(setup, episode) for index, episode in zip(usable, again, strict=True)}
 
 

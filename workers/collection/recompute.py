@@ -61,8 +61,7 @@ def rederive(setup: Setup, dataset: Dataset, shard: Shard) -> list[Defect]:
         schema.write(again, dataset.identity, shard.start, episodes)
         kept = fetch(dataset.path(shard))
         problems = [] if sha256(again) == sha256(kept) else [_told_difference(kept, again, dataset)]
-    seed, repeats = dataset.identity.seed, dataset.identity.repeats
-    problems.append(order_dependence(setup, seed, repeats, shard.start, episodes, attempts))
+    problems.append(order_dependence(setup, dataset.draws(), shard.start, episodes, attempts))
     return [Defect(shard.name, problem) for problem in problems if problem]
 
 

@@ -125,18 +125,16 @@ def roll_out(
 
     Args:
         setup: of the dataset.
-        dataset: whose seed and repeats hold.
+        dataset: whose draws they are.
         shard: which episodes.
         attempts: rolls them out, in this process or in one of their own.
 
     Returns:
         The episodes, in the order of their indices; those whose code raised have failed, and say why.
     """
-    seed, repeats = dataset.identity.seed, dataset.identity.repeats
+    draws = dataset.draws()
     with attempts(setup) as trying:
-        episodes = trying.rollouts(
-            draw(setup, seed, index, repeats) for index in range(shard.start, shard.stop)
-        )
+        episodes = trying.rollouts(draws.episode(setup, index) for index in range(shard.start, shard.stop))
     return [storable(setup, episode) for episode in episodes]
 
 
@@ -189,7 +187,7 @@ def _leak(setup: Setup, dataset: Dataset, shard: Shard, episodes: list[Episode])
     """Try episodes of a dataset's first shard in another order, if users supplied the robot."""
     if shard.start or not is_of_users(setup):
         return ""
-    return order_dependence(setup, dataset.identity.seed, dataset.identity.repeats, shard.start, episodes)
+    return order_dependence(setup, dataset.draws(), shard.start, episodes)
 
 
 def require_same_code(setup: Setup, dataset: Dataset) -> None:
@@ -208,6 +206,9 @@ def require_same_code(setup: Setup, dataset: Dataset) -> None:
         seed=asked.seed,
         episodes_per_shard=asked.episodes_per_shard,
         repeats=asked.repeats,
+        gap=asked.gap,
+        physics_of=asked.physics_of,
+        chosen=asked.chosen,
         storage=asked.storage,
     )
     differences = asked.differences(own)

@@ -14,6 +14,7 @@ from workers.collection.shard import ShardReport, collect_shard
 from workers.dataset.folder import Dataset, create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
+from workers.draws import Draws
 from workers.episode import FAILED, UNUSABLE, Episode
 from workers.isolation import IsolatedAttempts
 from workers.rollout import draw
@@ -62,7 +63,7 @@ class Sample:
     def ends(self) -> dict[int, Episode]:
         """The first and the last usable episode, rolled out one right after the other in another process."""
         with IsolatedAttempts(self.setup, self.timeout) as attempts:
-            return ends(self.setup, self.seed, 1, dict(enumerate(self.episodes)), attempts)
+            return ends(self.setup, Draws(self.seed), dict(enumerate(self.episodes)), attempts)
 
 
 @contextmanager

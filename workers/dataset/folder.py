@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Float32, Int64
 
 from workers.dataset import shards
+from workers.dataset.chosen import read_chosen, write_chosen
 from workers.dataset.identity import Identity
 from workers.dataset.manifest import MANIFEST, ensure_manifest, manifest_text
 from workers.dataset.schema import Columns, Outcomes, read, read_identity, read_outcomes, read_stops
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
+from workers.draws import Draws
 from workers.episode import UNUSABLE, Episode
 
 
@@ -41,6 +43,16 @@ class Dataset:
                     f"{one.name} and {next_one.name} in {self.folder} overlap; remove one of them"
                 )
         return found
+
+    def draws(self) -> Draws:
+        """How its episodes are drawn.
+
+        Raises:
+            ValueError: the file of its first controllers is missing or changed.
+        """
+        identity = self.identity
+        chosen = read_chosen(self.folder, identity.chosen) if identity.chosen else None
+        return Draws(identity.seed, identity.repeats, identity.physics_of, chosen)
 
     def missing(self, episodes: int) -> list[Shard]:
         """The shards still to be collected for that many episodes."""
@@ -119,12 +131,13 @@ class Dataset:
             yield shard, self.read(shard)
 
 
-def create(folder: Location, identity: Identity) -> Dataset:
+def create(folder: Location, identity: Identity, chosen: Float32[np.ndarray, "c d"] | None = None) -> Dataset:
     """Open the dataset in a folder, or begin it there.
 
     Args:
         folder: of the dataset, made when it is missing.
         identity: what is asked for.
+        chosen: controllers that come first, whose digest the identity states; None where all are drawn.
 
     Returns:
         The open dataset.
@@ -134,6 +147,8 @@ def create(folder: Location, identity: Identity) -> Dataset:
     """
     folder.mkdir(parents=True, exist_ok=True)
     _require_own_shards(folder, identity)
+    if chosen is not None and not (folder / MANIFEST).exists():
+        write_chosen(folder, chosen)
     dataset = _open(folder, ensure_manifest(folder, manifest_text(identity)))
     refusal = dataset.identity.refusal(identity, folder)
     if refusal:

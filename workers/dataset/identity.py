@@ -7,6 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, fields
 from importlib.metadata import distributions, version
 from typing import Any
 
+from workers.draws import EPISODE, PHYSICS_OF
 from workers.plug_ins import file_name
 from workers.rollout import VERSION as ROLLOUT_VERSION
 from workers.setups import Setup, registry, user_bad
@@ -44,6 +45,10 @@ class Identity:
         setup_digest: SHA-256 of the file of a user's setup; "" for those that ship.
         storage: how ξ is stored: `float32`, or `int16` codes between the bounds of its channels.
         packages: name and version of every further package that decides the bytes of an episode.
+        gap: level of hidden physics that they are drawn from, or its ranges; "" for those of the setup's
+            data collection.
+        physics_of: one of `workers.draws.PHYSICS_OF`, what has physics of its own.
+        chosen: SHA-256 of the file of controllers that come first; "" where all are drawn.
     """
 
     setup: str
@@ -66,11 +71,15 @@ class Identity:
     setup_digest: str = ""
     storage: str = "float32"
     packages: tuple[tuple[str, str], ...] = ()
+    gap: str = ""
+    physics_of: str = EPISODE
+    chosen: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse shards without episodes, controllers without them, and unknown storages."""
-        if self.storage not in STORAGES:
-            raise ValueError(f"storage must be one of {', '.join(STORAGES)}, got {self.storage!r}")
+        """Refuse shards without episodes, controllers without them, and unknown choices."""
+        for name, known in (("storage", STORAGES), ("physics_of", PHYSICS_OF)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
         for name in ("episodes_per_shard", "repeats"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -172,16 +181,27 @@ _FILES = (
 
 
 def identity_of(
-    setup: Setup, *, seed: int, episodes_per_shard: int, repeats: int = 1, storage: str = "float32"
+    setup: Setup,
+    *,
+    seed: int,
+    episodes_per_shard: int,
+    repeats: int = 1,
+    storage: str = "float32",
+    gap: str = "",
+    physics_of: str = EPISODE,
+    chosen: str = "",
 ) -> Identity:
     """Identify a dataset that is collected now, with this code and these libraries.
 
     Args:
-        setup: what is rolled out.
+        setup: what is rolled out, under the physics of `gap`.
         seed: of all controllers and physics.
         episodes_per_shard: of a whole file, at least 1.
         repeats: episodes of each controller, at least 1.
         storage: of ξ, one of `STORAGES`.
+        gap: name of those physics; "" for those of the setup's data collection.
+        physics_of: one of `workers.draws.PHYSICS_OF`, what has physics of its own.
+        chosen: SHA-256 of the file of controllers that come first; "" where all are drawn.
 
     Returns:
         The identity.
@@ -207,6 +227,9 @@ def identity_of(
         setup_digest=setup.code,
         storage=storage,
         packages=tuple((name, version(name)) for name in setup.packages),
+        gap=gap,
+        physics_of=physics_of,
+        chosen=chosen,
     )
 
 

@@ -12,9 +12,9 @@ from workers.dataset.identity import Identity
 from workers.dataset.schema import Columns, read, read_identity
 from workers.dataset.shards import Shard
 from workers.dataset.storage.location import Location, fetch
+from workers.draws import Draws
 from workers.episode import UNUSABLE, degrees
 from workers.physics import PhysicsRanges
-from workers.randomness import Stream, generator
 from workers.tasks.stop import STOPPED
 
 
@@ -98,7 +98,7 @@ def _row_problems(dataset: Dataset, shard: Shard, path: Location) -> Iterator[st
         yield str(error)
         return
     if np.array_equal(columns.episode, np.arange(shard.start, shard.stop)):
-        yield from _content_problems(columns, dataset.identity)
+        yield from _content_problems(columns, dataset.identity, dataset.draws())
     else:
         yield f"its rows are not the episodes {shard.start} to {shard.stop - 1}"
 
@@ -121,7 +121,7 @@ def _stop_problems(columns: Columns, identity: Identity) -> Iterator[str]:
         yield "an episode goes on after it was stopped"
 
 
-def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
+def _content_problems(columns: Columns, identity: Identity, draws: Draws) -> Iterator[str]:
     if not all(np.isfinite(values).all() for values in (columns.x, columns.xi, columns.y, columns.f)):
         yield "it holds numbers that are not finite"
     if not np.all((degrees(columns.bad) >= 0.0) & (degrees(columns.bad) <= 1.0)):
@@ -129,18 +129,14 @@ def _content_problems(columns: Columns, identity: Identity) -> Iterator[str]:
     if not np.allclose(columns.y, degrees(columns.bad).mean(axis=1, dtype=np.float64), atol=1e-6):
         yield "y is not the mean of the bad steps"
     yield from _stop_problems(columns, identity)
-    drawn = columns.episode // identity.repeats
-    controllers = (generator(identity.seed, Stream.CONTROLLER, int(index)) for index in drawn)
-    width = columns.x.shape[1]
+    indices, width = columns.episode.tolist(), columns.x.shape[1]
     if not all(
-        np.array_equal(x, rng.random(width, dtype=np.float32))
-        for x, rng in zip(columns.x, controllers, strict=True)
+        np.array_equal(x, draws.controller(width, index)) for x, index in zip(columns.x, indices, strict=True)
     ):
         yield f"its controllers are not those of seed {identity.seed}"
     ranges = PhysicsRanges(identity.physics)
-    draws = (ranges.draw(generator(identity.seed, Stream.PHYSICS, int(index))) for index in columns.episode)
     if not all(
-        draw == {name: values[row] for name, values in columns.physics.items()}
-        for row, draw in enumerate(draws)
+        draws.physics(ranges, index) == {name: values[row] for name, values in columns.physics.items()}
+        for row, index in enumerate(indices)
     ):
         yield f"its physics are not those of seed {identity.seed}"

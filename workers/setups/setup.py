@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from workers import plain
 from workers.controllers.controller import Controller
@@ -133,6 +133,10 @@ class Setup:
     def open(self) -> Environment:
         """Start the simulated environment; close it, or use it in a `with` block."""
         return self.build()
+
+    def under(self, gap: str) -> "Setup":
+        """The same with the physics of a gap in place of those of data collection; "" changes nothing."""
+        return replace(self, physics=self.gap(gap)) if gap else self
 
     def gap(self, level: str) -> PhysicsRanges:
         """Ranges of a sim-to-real gap level, or those written out, such as `friction=1:2.5,restitution=0.05`.

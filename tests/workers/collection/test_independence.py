@@ -31,7 +31,7 @@ LEAKS = {
 def told(setup) -> str:
     with Attempts(setup) as attempts:
         episodes = attempts.rollouts(draw(setup, 0, index) for index in range(4))
-    return order_dependence(setup, 0, 1, 0, episodes)
+    return order_dependence(setup, Draws(0), 0, episodes)
 
 
 def test_a_sound_robot_has_nothing_to_tell(own_robot):
