@@ -212,12 +212,12 @@ def choose(place: Location, setup: Setup, keep: Keep, count: int) -> Float32[np.
                 f"the controllers of {place} ({dataset.identity.setup}) are not those of {setup.name}: "
                 "choose among a dataset of the same robot"
             )
-        return _chosen(dataset, keep, count)
+        return _select(dataset, keep, count)
     except (ValueError, OSError) as error:
         raise UserError(f"cannot choose among the controllers of {place}: {error}") from error
 
 
-def _chosen(dataset: Dataset, keep: Keep, count: int) -> Float32[np.ndarray, "c d"]:
+def _select(dataset: Dataset, keep: Keep, count: int) -> Float32[np.ndarray, "c d"]:
     """Each controller is judged by the mean of its episodes; equal ones keep their order."""
     x, scores = [], []
     repeats = dataset.identity.repeats

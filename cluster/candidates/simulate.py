@@ -50,7 +50,7 @@ def summarise(plan: CandidatesPlan) -> CandidateTable:
     Raises:
         UserError: an episode cannot be read, or the disk takes no more.
     """
-    parts = [_simulated(plan, collection.dataset) for collection in plan.collections]
+    parts = [_outcomes(plan, collection.dataset) for collection in plan.collections]
     table = CandidateTable(
         x=parts[0]["x"],
         **{name: np.concatenate([part[name] for part in parts], axis=1) for name in ("f", "y", "bad", "tau")},
@@ -84,7 +84,7 @@ def say_table(plan: CandidatesPlan, table: CandidateTable) -> None:
     )
 
 
-def _simulated(plan: CandidatesPlan, dataset: Dataset) -> dict[str, np.ndarray]:
+def _outcomes(plan: CandidatesPlan, dataset: Dataset) -> dict[str, np.ndarray]:
     """What the episodes of one setup showed, [candidate, world, ...]."""
     parts = list(_parts(plan, dataset))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -10,9 +10,8 @@ import typer
 from typer.exceptions import TyperException
 
 from cluster.cli import dataset, hardware, setups
-from cluster.cli.candidates import candidates
 from cluster.cli.check import check
-from cluster.cli.collect import collect
+from cluster.cli.collect import candidates, collect
 from cluster.cli.compare import compare
 from cluster.cli.demo import demo
 from cluster.cli.listings import methods, robots

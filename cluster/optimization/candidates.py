@@ -16,7 +16,7 @@ from jaxtyping import Float32, Float64
 from cluster.errors import UserError
 from cluster.files import replacing
 from svaedc.bo.features import Latents
-from svaedc.bo.simulated.outcomes import Lookup, Simulated, SimulatedLatents
+from svaedc.bo.simulated.outcomes import Lookup, SimulatedLatents, SimulatedOutcomes
 from workers.dataset.shards import sha256
 from workers.dataset.storage.location import arrow_name
 from workers.rollout import VERSION
@@ -57,13 +57,14 @@ class CandidateTable:
         """Latent paths, averaged over the worlds."""
         return self.tau.mean(axis=1)
 
+    @property
     def drawn(self) -> Float32[np.ndarray, "m d"]:
         """Those that were not chosen, but drawn from the whole unit cube."""
         return self.x[self.origin["chosen"] :]
 
-    def simulated(self) -> Simulated:
+    def outcomes(self) -> SimulatedOutcomes:
         """The outcomes, as methods take them."""
-        return Simulated(torch.from_numpy(self.f), torch.from_numpy(self.y), Lookup(self.x))
+        return SimulatedOutcomes(torch.from_numpy(self.f), torch.from_numpy(self.y), Lookup(self.x))
 
     def latents(self, pool: Float32[np.ndarray, "n d"]) -> Latents | None:
         """Latent paths and badness of some of the candidates, as methods take them; None without a model.

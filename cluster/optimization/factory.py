@@ -60,7 +60,7 @@ class Optimization:
             A point of the unit cube, [D]; one of the candidates that were drawn, where there are candidates.
         """
         if self.candidates is not None:
-            drawn = self.candidates.drawn()
+            drawn = self.candidates.drawn
             return drawn[generator(self.seed, Stream.INITIAL, 0).permutation(len(drawn))[index]]
         return self._uniform(generator(self.seed, Stream.INITIAL, index), (self.setup.dimensions,))
 
@@ -75,7 +75,7 @@ class Optimization:
             self.setup.dimensions,
             self.setup.objective_limits,
             pool,
-            simulated=candidates.simulated() if candidates else None,
+            simulated=candidates.outcomes() if candidates else None,
         )
         if self.model is None or not methods.needs_model(self.method):
             return problem

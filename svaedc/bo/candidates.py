@@ -15,7 +15,7 @@ from svaedc.bo.distribution_features import Densities, Density
 from svaedc.bo.features import Embedding, Latents
 from svaedc.bo.history import History
 from svaedc.bo.online import Adjustable
-from svaedc.bo.simulated.outcomes import Simulated
+from svaedc.bo.simulated.outcomes import SimulatedOutcomes
 
 Part = TypeVar("Part")
 
@@ -44,7 +44,7 @@ class Problem:
     densities: Densities | None = None
     adjustable: Adjustable | None = None
     largest_y: float = 1.0
-    simulated: Simulated | None = None
+    simulated: SimulatedOutcomes | None = None
 
     def __post_init__(self) -> None:
         """Refuses parts that do not belong together."""
@@ -78,7 +78,7 @@ class Problem:
         """The distributions; without them, a `ValueError`."""
         return _require(self.densities, "densities", "Densities.of(model)")
 
-    def known_simulated(self) -> Simulated:
+    def known_outcomes(self) -> SimulatedOutcomes:
         """The simulated outcomes; without them, a `ValueError`."""
         if self.simulated is None:
             raise ValueError(

@@ -81,18 +81,18 @@ class GaussianProcess:
         return self._offset + self._unit * mu, self._unit * sigma
 
 
-def scale_objectives(f: Float[Tensor, " n"], limits: tuple[float, float]) -> Float[Tensor, " n"]:
+def scale_objectives(f: Float[Tensor, "*n"], limits: tuple[float, float]) -> Float[Tensor, "*n"]:
     """Put the setup's limits at 0 and 1.
 
     The limits are fixed per setup. Standardising by the few values of a run would make its first step depend
     on the luck of two random trials.
 
     Args:
-        f: Objectives, [n].
+        f: Objectives, [*n].
         limits: Objectives that become 0 and 1.
 
     Returns:
-        Scaled objectives, [n]; outside [0, 1] where an objective is beyond the limits.
+        Scaled objectives, [*n]; outside [0, 1] where an objective is beyond the limits.
     """
     low, high = limits
     return (f - low) / (high - low)

@@ -136,12 +136,12 @@ def _pool_of(method: Method) -> Candidates | None:
 
 def _in_order(problem: Problem, score: Callable[[Tensor, Tensor], Tensor]) -> Method:
     """By a score of the simulated objectives and badnesses [n, e]."""
-    simulated, x = problem.known_simulated(), torch.tensor(problem.pool)
+    simulated, x = problem.known_outcomes(), torch.tensor(problem.pool)
     return InOrder(as_they_are(problem), score(simulated.objectives(x), simulated.badness(x)))
 
 
 def _in_simulation(problem: Problem, method: Callable[[Candidates], Method]) -> Method:
-    problem.known_simulated()
+    problem.known_outcomes()
     return method(as_they_are(problem))
 
 

@@ -36,6 +36,6 @@ def latent_paths(
     with torch.no_grad():
         for start in range(0, len(xi), _TOGETHER):
             rows = slice(start, start + _TOGETHER)
-            episodes = (torch.from_numpy(np.ascontiguousarray(part[rows])) for part in (xi, bad, y))
+            episodes = (torch.tensor(part[rows]) for part in (xi, bad, y))
             found.append(model.split(model.posterior(*episodes).loc)[0])
     return torch.cat(found).double().numpy()

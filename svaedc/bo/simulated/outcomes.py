@@ -38,7 +38,7 @@ class Lookup:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulatedOutcomes:
     """How every candidate fared in every world; also of candidates that a pool leaves out.
 
     Attributes:

@@ -163,7 +163,7 @@ def on_compressed_paths(
 def _on_latents(
     embedding: Embedding, prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem
 ) -> Surrogate:
-    problem.known_simulated()
+    problem.known_outcomes()
     return _surrogate(by_latents(problem, embedding), prior, kernel, problem)
 
 
@@ -185,7 +185,7 @@ def _surrogate(
 
 def _with_simulations(candidates: Candidates, problem: Problem) -> Candidates:
     """The same pool; its features have the scaled objectives of all worlds behind them."""
-    simulated = problem.known_simulated()
+    simulated = problem.known_outcomes()
 
     def embed(x: Tensor) -> Tensor:
         f = scale_objectives(simulated.objectives(x).double(), problem.objective_limits)
