@@ -8,6 +8,7 @@ from svaedc.bo.candidates import Problem
 from svaedc.bo.distribution_features import Densities, Density
 from svaedc.bo.features import Latents
 from svaedc.bo.online import Adjustable
+from svaedc.bo.simulated.outcomes import Lookup, SimulatedOutcomes
 
 TAU_DIMENSIONS = 3
 
@@ -39,15 +40,27 @@ def rows(x: torch.Tensor) -> torch.Tensor:
     return torch.cat([tau, (x.double()[:, 1:2] - 1).expand_as(tau)], dim=-1)
 
 
+class EverywhereSimulated(SimulatedOutcomes):
+    """Three worlds in which any controller was simulated: each world has its own optimum."""
+
+    def objectives(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.stack([1 - (x - center).square().sum(dim=1) for center in (0.2, 0.3, 0.5)], dim=1)
+
+    def badness(self, x: torch.Tensor) -> torch.Tensor:
+        return latent_means(x)[1][:, None].expand(-1, 3)
+
+
 def problem(dimensions: int, candidates: int, seed: int) -> Problem:
-    """A run's problem with a random pool and its fake latents, objectives between -1 and 1."""
+    """A run's problem with a random pool, its fake latents and outcomes, objectives between -1 and 1."""
     pool = np.random.default_rng(seed).random((candidates, dimensions), dtype=np.float32)
     latents = Latents.of(torch.tensor(pool), latent_means)
     densities = Densities(
         tau=Density(rows, distribution_features.laplace), xi=Density(rows, distribution_features.gaussian)
     )
     adjustable = Adjustable(FakeModel(), layers=("last.weight",))
-    return Problem(dimensions, (-1.0, 1.0), pool, latents, densities, adjustable)
+    nothing = torch.zeros(1, 1)
+    simulated = EverywhereSimulated(nothing, nothing, Lookup(pool))
+    return Problem(dimensions, (-1.0, 1.0), pool, latents, densities, adjustable, simulated=simulated)
 
 
 def quadratic(x: np.ndarray) -> float:

@@ -9,7 +9,8 @@ from svaedc.bo import method_names, methods
 def test_every_method_that_is_made_has_a_name_and_every_name_is_made():
     assert methods.SURROGATES.keys() == method_names.CONTROLLERS.keys()
     assert methods.LATENT_SURROGATES.keys() == method_names.LATENT.keys()
-    assert methods._RANDOM.keys() == method_names.RANDOM.keys()
+    assert methods.SIMULATED_SURROGATES.keys() == method_names.PRIORS.keys()
+    assert methods._UNLEARNT.keys() == (method_names.RANDOM | method_names.SIMULATED).keys()
     assert tuple(methods._SEARCHES) == method_names.SEARCHES
     assert tuple(methods._ACQUISITIONS) == method_names.ACQUISITIONS
 

@@ -107,7 +107,7 @@ def test_every_prior_goes_on_from_its_history_alone(name):
 )
 def test_a_problem_without_simulated_candidates_is_refused_naming_the_command(name):
     with pytest.raises(ValueError, match=f"{name}.*`svaedc candidates`"):
-        methods.build(name, problem(3, 10, 0))
+        methods.build(name, replace(problem(3, 10, 0), simulated=None))
 
 
 def test_a_search_between_the_candidates_is_refused():
