@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cluster.cli.documents import one_document
-from cluster.cli.options import Address, Config, Overrides, Seed, TrainedModel, services, settings_of
+from cluster.cli.options import (
+    Address,
+    Config,
+    Overrides,
+    Seed,
+    SimulatedCandidates,
+    TrainedModel,
+    services,
+    settings_of,
+)
 from cluster.cli.output import show
 from cluster.hardware.states import Approval
 from cluster.inputs import durable
@@ -52,6 +61,7 @@ def start(
     ],
     method: Annotated[str, typer.Option("--method", help="How controllers are suggested.")] = "svae-dc",
     model: TrainedModel = None,
+    candidates: SimulatedCandidates = None,
     trials: Annotated[
         int, typer.Option("--trials", min=0, help="Suggested trials, after 2 random ones.")
     ] = 10,
@@ -72,16 +82,15 @@ def start(
     """Carry a campaign out, or go on with it: 2 random trials, then suggested ones."""
     from cluster.hardware.driver import start as run_start
     from cluster.hardware.plan import CampaignPlan, identify
+    from cluster.optimization.candidates import TABLE
     from svaedc.model.checkpoint import checkpoint_path
 
     settings = settings_of(config, overrides)
     checkpoint = checkpoint_path(model) if model else None
-    plan = CampaignPlan(
-        identify(robot, method, trials, seed, settings.hardware.pool_size, checkpoint, approval),
-        folder,
-        checkpoint,
-        pace,
-    )
+    table = candidates / TABLE if candidates else None
+    pool = settings.hardware.pool_size
+    identity = identify(robot, method, trials, seed, pool, checkpoint, approval, table)
+    plan = CampaignPlan(identity, folder, checkpoint, pace, table)
     with services(settings, address) as (session, tracker):
         last = run_start(settings.hardware, session, tracker, plan, _report, say)
     _show(last)

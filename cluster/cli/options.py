@@ -59,7 +59,7 @@ SimulatedCandidates = Annotated[
     Path | None,
     typer.Option(
         "--candidates",
-        help="Folder of candidates that `svaedc candidates` simulated; all runs choose among them.",
+        help="Folder of candidates that `svaedc candidates` simulated, to choose among.",
         callback=durable,
     ),
 ]

@@ -82,7 +82,7 @@ def _campaign(plan: CampaignPlan, opened: Journal) -> Campaign:
     return Campaign(
         journal=opened,
         robot=robots.find(identity.robot).connect(identity.seed, plan.pace, plan.folder),
-        proposals=Proposals.of(identity, setup, plan.model),
+        proposals=Proposals.of(identity, setup, plan.model, plan.candidates),
         dimensions=setup.dimensions,
         process=asdict(Process.current()),
         versions=library_versions(),

@@ -34,6 +34,7 @@ class CampaignIdentity:
             campaign keeps the one that it began with.
         codes: SHA-256 of the files of a user's own setup and method by their names, as JSON; "" where both
             ship, and of campaigns that began before there was such a field.
+        candidates: SHA-256 of the table of simulated candidates that it chooses among; "" for none.
     """
 
     robot: str
@@ -46,6 +47,7 @@ class CampaignIdentity:
     approval: Approval
     draws: int = 1
     codes: str = ""
+    candidates: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -93,4 +95,4 @@ class CampaignIdentity:
                 )
 
 
-_BEFORE = (("draws", 1), ("codes", ""))
+_BEFORE = (("draws", 1), ("codes", ""), ("candidates", ""))

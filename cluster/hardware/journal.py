@@ -185,7 +185,7 @@ class Journal:
         if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
             raise _absent(self.path)
         try:
-            # Journals of svaedc 0.1.0 have neither `draws` nor `codes`.
+            # Journals of svaedc 0.1.0 have none of `draws`, `codes` and `candidates`.
             row = self._connection.execute("SELECT * FROM campaign").fetchone()
             if row is None:
                 raise corrupt(self.path, "it names no campaign")

@@ -10,7 +10,9 @@ from cluster.hardware.proposals import fingerprint
 from cluster.hardware.states import Approval
 from cluster.inputs import search_working_directory
 from cluster.optimization import methods
+from cluster.optimization.candidates import require_usable
 from cluster.optimization.factory import DRAWS
+from workers.dataset.shards import sha256
 from workers.hardware import robots
 from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
 from workers.setups import SETUPS, registry
@@ -25,23 +27,34 @@ class CampaignPlan:
         folder: of its journal and ledger, on a local disk of the robot's machine; kept absolute.
         model: checkpoint, kept absolute; None for a method without one.
         pace: least duration of a trial on a rehearsal robot, in s, at most a day.
+        candidates: table of simulated ones, kept absolute; None where the campaign draws its own.
     """
 
     identity: CampaignIdentity
     folder: Path
     model: Path | None
     pace: float
+    candidates: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.pace <= LONGEST_PACE_SECONDS:
             raise UsageError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {self.pace}")
         # The process that carries it out has a working directory of its own.
         object.__setattr__(self, "folder", self.folder.absolute())
-        object.__setattr__(self, "model", self.model and self.model.absolute())
+        for field in ("model", "candidates"):
+            path = getattr(self, field)
+            object.__setattr__(self, field, path and path.absolute())
 
 
 def identify(
-    robot: str, method: str, trials: int, seed: int, pool: int, model: Path | None, approval: Approval
+    robot: str,
+    method: str,
+    trials: int,
+    seed: int,
+    pool: int,
+    model: Path | None,
+    approval: Approval,
+    candidates: Path | None = None,
 ) -> CampaignIdentity:
     """Check the arguments of a campaign, and make its identity of them.
 
@@ -53,13 +66,14 @@ def identify(
         pool: number of random controllers the method chooses from, at least 1.
         model: checkpoint; ignored by methods without a model.
         approval: who approves.
+        candidates: table of simulated ones; None where the campaign draws its own.
 
     Returns:
         The identity; its model is "" where the method needs none.
 
     Raises:
         UsageError: when a name or number is none that exists; the message names the nearest.
-        UserError: when the model cannot be read.
+        UserError: when the model or the candidates cannot be read, or the candidates are of another robot.
     """
     try:
         search_working_directory()
@@ -72,9 +86,25 @@ def identify(
         if needs_model and model is None:
             raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
         digest = fingerprint(model) if needs_model and model else ""
-        codes = _codes(known.setup, method)
+        if methods.needs_candidates(method) and candidates is None:
+            raise UsageError(
+                f"method {method!r} needs candidates that were simulated, got none: make some with "
+                "`svaedc candidates` and name their folder with --candidates"
+            )
+        if candidates is not None:
+            require_usable(candidates, registry.load(known.setup), model if needs_model else None)
         return CampaignIdentity(
-            robot, known.setup, method, seed, digest, pool, trials, approval, DRAWS, codes
+            robot,
+            known.setup,
+            method,
+            seed,
+            digest,
+            pool,
+            trials,
+            approval,
+            DRAWS,
+            _codes(known.setup, method),
+            sha256(candidates) if candidates is not None else "",
         )
     except (LookupError, ValueError) as error:
         raise UsageError(str(error.args[0])) from error

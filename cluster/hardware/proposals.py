@@ -13,6 +13,7 @@ from cluster.errors import UserError
 from cluster.hardware.identity import CampaignIdentity
 from cluster.inputs import usage_errors
 from cluster.optimization import methods
+from cluster.optimization.candidates import CandidateTable, read
 from cluster.optimization.factory import Optimization
 from cluster.optimization.models import trained_model
 from svaedc.bo.features import Latents
@@ -39,19 +40,23 @@ class Proposals:
     latents: Latents | None
 
     @classmethod
-    def of(cls, identity: CampaignIdentity, setup: Setup, model: Path | None) -> "Proposals":
+    def of(
+        cls, identity: CampaignIdentity, setup: Setup, model: Path | None, candidates: Path | None = None
+    ) -> "Proposals":
         """Builds the method from the campaign's identity alone, so that every process builds the same.
 
         Args:
             identity: of the campaign.
             setup: of its robot.
             model: checkpoint; None for a method without one.
+            candidates: table of simulated ones; None where the campaign draws its own.
 
         Returns:
             The proposals.
 
         Raises:
-            UserError: when there is no such method, or the model is missing, damaged, or another setup's.
+            UserError: when there is no such method, the model is missing, damaged, or another setup's, or the
+                candidates are not those that the campaign was planned with.
         """
         needs_model = methods.needs_model(identity.method)
         optimization = Optimization(
@@ -61,6 +66,7 @@ class Proposals:
             identity.pool,
             _network(identity, model) if needs_model else None,
             identity.draws,
+            _candidates(identity, candidates),
         )
         problem = optimization.problem()
         with usage_errors():
@@ -90,26 +96,36 @@ class Proposals:
         return float(self.latents.means(torch.tensor(x[None]))[1])
 
 
-def fingerprint(model: Path | None) -> str:
-    """SHA-256 of a checkpoint file; "" for none.
+def fingerprint(path: Path | None) -> str:
+    """SHA-256 of a checkpoint, or of a table of candidates; "" for none.
 
     Raises:
         UserError: when the file cannot be read.
     """
-    if model is None:
+    if path is None:
         return ""
     try:
-        with model.open("rb") as file:
+        with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise UserError(
-            f"cannot read the model {model}: {error.strerror}; name a checkpoint of svaedc train"
+            f"cannot read the model or candidates {path}: {error.strerror}; name the folder that "
+            "`svaedc train` or `svaedc candidates` left"
         ) from error
 
 
 def library_versions() -> dict[str, str]:
     """Versions of the libraries whose arithmetic a proposal depends on."""
     return {library: version(library) for library in LIBRARIES}
+
+
+def _candidates(identity: CampaignIdentity, candidates: Path | None) -> CandidateTable | None:
+    if fingerprint(candidates) != identity.candidates:
+        raise UserError(
+            f"the candidates {candidates or '(none)'} are not those that this campaign was planned with: "
+            "name the same folder with --candidates, or restore the table in it"
+        )
+    return read(candidates) if candidates is not None else None
 
 
 def _network(identity: CampaignIdentity, model: Path | None) -> SvaeDc:

@@ -206,4 +206,4 @@ def _lists(values: np.ndarray) -> pa.Array:
 
 def _dense(column: pa.ChunkedArray, shape: tuple[int, ...]) -> np.ndarray:
     values = pa.chunked_array([chunk.flatten() for chunk in column.chunks], column.type.value_type)
-    return np.array(values).reshape(shape)
+    return values.to_numpy().reshape(shape).copy()

@@ -46,7 +46,7 @@ def test_a_plan_means_the_same_folder_in_every_working_directory(monkeypatch, tm
 
 
 def test_a_model_that_is_missing_is_named(tmp_path):
-    with pytest.raises(UserError, match=r"cannot read the model .*none\.pt"):
+    with pytest.raises(UserError, match=r"cannot read the model or candidates .*none\.pt"):
         plan_in(tmp_path, "svae-dc", model=tmp_path / "none.pt")
 
 

@@ -5,14 +5,17 @@ import json
 import numpy as np
 import pytest
 
-from cluster.errors import UserError
+from cluster.errors import UsageError, UserError
 from cluster.hardware import operator
 from cluster.hardware.executor import Executor
 from cluster.hardware.plan import identify
 from cluster.hardware.proposals import Proposals, fingerprint, library_versions
 from cluster.hardware.states import Approval
+from cluster.optimization.candidates import TABLE, write
+from svaedc.bo.history import History
 from svaedc.model import checkpoint
 from tests.cluster.hardware.rehearsals import ROBOT, carried_out, plan_in
+from tests.cluster.optimization.tables import table
 from workers import setups
 
 
@@ -55,3 +58,24 @@ def test_a_method_without_model_predicts_nothing():
     proposals = Proposals.of(identify(ROBOT, "se", 1, 0, 9, None, Approval.POLICY), setup, None)
     assert proposals.predict(np.full(setup.dimensions, 0.5)) is None
     assert fingerprint(None) == ""
+
+
+def test_a_campaign_chooses_among_the_candidates_it_was_planned_with_and_no_others(tmp_path):
+    path, candidates = tmp_path / TABLE, table()
+    write(path, candidates)
+    identity = identify(ROBOT, "simulated-best", 1, 0, 100, None, Approval.POLICY, path)
+    setup = setups.load(identity.setup)
+    proposals = Proposals.of(identity, setup, None, path)
+    assert proposals.random(0).tobytes() in {row.tobytes() for row in candidates.drawn}
+    best = candidates.x[candidates.f.mean(axis=1).argmax()]
+    assert np.array_equal(proposals.suggest(History.empty(setup.dimensions), 2), best)
+    with pytest.raises(UserError, match=r"candidates \(none\) are not those"):
+        Proposals.of(identity, setup, None)
+    write(path, table(chosen=6))
+    with pytest.raises(UserError, match="are not those that this campaign was planned with"):
+        Proposals.of(identity, setup, None, path)
+
+
+def test_a_method_that_lacks_its_candidates_is_refused():
+    with pytest.raises(UsageError, match="needs candidates that were simulated, got none"):
+        identify(ROBOT, "simulated-best", 1, 0, 9, None, Approval.POLICY)

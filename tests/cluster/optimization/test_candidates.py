@@ -4,33 +4,11 @@ import numpy as np
 import pytest
 
 from cluster.errors import UserError
-from cluster.optimization.candidates import TABLE, CandidateTable, parameters_of, read, require_usable, write
+from cluster.optimization.candidates import TABLE, read, require_usable, write
 from cluster.optimization.factory import Optimization
+from tests.cluster.optimization.tables import FRANKA, table
 from workers import setups
 from workers.rollout import VERSION
-
-FRANKA, RNG = setups.load("franka"), np.random.default_rng(0)
-ORIGIN = {
-    "setups": ["franka"],
-    "parameters": parameters_of(FRANKA),
-    "rollout_version": VERSION,
-    "chosen": 5,
-    "conditions": ["a", "b"],
-    "worlds": [{"setup": "franka"}] * 3,
-    "model": "",
-    "path": 4,
-}
-
-
-def table(**changes):
-    return CandidateTable(
-        x=RNG.random((30, 48), dtype=np.float32),
-        f=RNG.random((30, 3)),
-        y=RNG.random((30, 3)),
-        bad=RNG.random((30, 3, 2)),
-        tau=RNG.random((30, 3, 4)),
-        origin={**ORIGIN, **changes},
-    )
 
 
 def test_what_is_written_is_read_again(tmp_path):

@@ -1,0 +1,30 @@
+"""Tables of candidates whose numbers mean nothing."""
+
+import numpy as np
+
+from cluster.optimization.candidates import CandidateTable, parameters_of
+from workers import setups
+from workers.rollout import VERSION
+
+FRANKA, RNG = setups.load("franka"), np.random.default_rng(0)
+ORIGIN = {
+    "setups": ["franka"],
+    "parameters": parameters_of(FRANKA),
+    "rollout_version": VERSION,
+    "chosen": 5,
+    "conditions": ["a", "b"],
+    "worlds": [{"setup": "franka"}] * 3,
+    "model": "",
+    "path": 4,
+}
+
+
+def table(**changes):
+    return CandidateTable(
+        x=RNG.random((30, 48), dtype=np.float32),
+        f=RNG.random((30, 3)),
+        y=RNG.random((30, 3)),
+        bad=RNG.random((30, 3, 2)),
+        tau=RNG.random((30, 3, 4)),
+        origin={**ORIGIN, **changes},
+    )
