@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from cluster.candidates.plan import plan_candidates
+from cluster.candidates.simulate import simulate
 from cluster.comparison import compare as comparison_driver
 from cluster.comparison.compare import Comparison
 from cluster.comparison.plan import Grid, plan_comparison
@@ -21,6 +23,7 @@ from cluster.datasets.plan import plan_collection, say_complete
 from cluster.errors import UserError
 from cluster.inputs import dataset_location, durable_dataset, require_working_setup, setup_of
 from cluster.optimization import methods as known_methods
+from cluster.optimization.candidates import CandidateTable, read
 from cluster.optimization.factory import hidden_robot
 from cluster.optimization.models import TrainedModel, load_model
 from cluster.services import services
@@ -82,6 +85,7 @@ def collect(
     *,
     seed: int = 0,
     repeats: int = 1,
+    gap: str = "",
     settings: Mapping[str, Any] = AS_CONFIGURED,
     address: str | None = None,
 ) -> Dataset:
@@ -93,6 +97,7 @@ def collect(
         episodes: that it shall hold.
         seed: of all controllers and physics.
         repeats: episodes of each controller, each under other physics.
+        gap: level that the physics are drawn from, or its ranges; "" for those of data collection.
         settings: any of `ray_config.yaml`, by `section.key`.
         address: of a running Ray cluster; None starts one here.
 
@@ -109,6 +114,7 @@ def collect(
         folder=durable_dataset(str(dataset)),
         seed=seed,
         repeats=repeats,
+        gap=gap,
         settings=known.collect,
     )
     if not plan.missing:
@@ -167,6 +173,7 @@ def compare(
     trials: int = 20,
     gap: str = "paper",
     seed: int = 0,
+    candidates: Path | str | None = None,
     settings: Mapping[str, Any] = AS_CONFIGURED,
     address: str | None = None,
 ) -> Comparison:
@@ -181,6 +188,7 @@ def compare(
         trials: suggested in each run, after the random ones.
         gap: hidden physics: `paper`, `training`, `wide`, or ranges written out.
         seed: of the first run.
+        candidates: folder that `simulate_candidates` left, to choose among; None to draw them.
         settings: any of `ray_config.yaml`, by `section.key`.
         address: of a running Ray cluster; None starts one here.
 
@@ -199,9 +207,59 @@ def compare(
         model=None if model is None else Path(model).absolute(),
         folder=Path(out).absolute(),
         settings=known.compare,
+        candidates=None if candidates is None else Path(candidates).absolute(),
     )
     with services(known, address) as (session, tracker):
         return comparison_driver.compare(plan, session, tracker)
+
+
+def simulate_candidates(
+    setup: Setup | str,
+    out: Path | str,
+    *,
+    model: Path | str | None = None,
+    count: int = 2000,
+    episodes: int = 6,
+    gap: str = "wide",
+    seed: int = 1,
+    settings: Mapping[str, Any] = AS_CONFIGURED,
+    address: str | None = None,
+) -> CandidateTable:
+    """Simulate controllers under several physics each, before any is tried; what the folder holds is kept.
+
+    Args:
+        setup: whose controllers, or its name. Rollout processes import it by its name.
+        out: folder of the candidates.
+        model: folder of a model of this setup, which encodes the episodes; None for none.
+        count: how many candidates.
+        episodes: of each, under different physics.
+        gap: level that the physics are drawn from, or its ranges.
+        seed: of all draws.
+        settings: any of `ray_config.yaml`, by `section.key`.
+        address: of a running Ray cluster; None starts one here.
+
+    Returns:
+        What simulation showed of every candidate.
+
+    Raises:
+        UserError: as `svaedc candidates` says it.
+    """
+    known = _settings(settings)
+    plan = plan_candidates(
+        setups=[require_working_setup(_setup(setup), seed)],
+        count=count,
+        episodes=episodes,
+        gap=gap,
+        seed=seed,
+        model=None if model is None else Path(model).absolute(),
+        chosen=None,
+        folder=Path(out).absolute(),
+        settings=known.collect,
+    )
+    if plan.is_whole:
+        return read(plan.table)
+    with services(known, address, parts=()) as (session, tracker):
+        return simulate(plan, known.collect, session, tracker)
 
 
 @contextmanager

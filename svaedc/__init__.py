@@ -25,6 +25,7 @@ _WHERE: Final = {
     "method_names": "cluster.api",
     "open_dataset": "cluster.api",
     "setup_names": "cluster.api",
+    "simulate_candidates": "cluster.api",
     "simulated_robot": "cluster.api",
     "train": "cluster.api",
 }

@@ -4,6 +4,7 @@ from cluster.api import load_setup as load_setup
 from cluster.api import method_names as method_names
 from cluster.api import open_dataset as open_dataset
 from cluster.api import setup_names as setup_names
+from cluster.api import simulate_candidates as simulate_candidates
 from cluster.api import simulated_robot as simulated_robot
 from cluster.api import train as train
 from cluster.optimization.models import load_model as load_model

@@ -20,7 +20,9 @@ from workers.dataset.statistics import bad_steps
 from workers.episode import degrees, stride_steps
 
 
-def simulate(plan: CandidatesPlan, settings: CollectSettings, session: Session, tracker: Tracker) -> None:
+def simulate(
+    plan: CandidatesPlan, settings: CollectSettings, session: Session, tracker: Tracker
+) -> CandidateTable:
     """Roll out what is missing of the candidates' episodes, and write their table.
 
     Args:
@@ -29,13 +31,16 @@ def simulate(plan: CandidatesPlan, settings: CollectSettings, session: Session, 
         session: where the actors run.
         tracker: that records it.
 
+    Returns:
+        The table.
+
     Raises:
         UserError: as `collect` does.
     """
     for collection in plan.collections:
         if collection.missing:
             collect(collection, settings, session, tracker)
-    summarise(plan)
+    return summarise(plan)
 
 
 def summarise(plan: CandidatesPlan) -> CandidateTable:
