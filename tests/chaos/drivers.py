@@ -24,7 +24,8 @@ from workers.dataset.shards import Shard, present
 from workers.dataset.storage.temporary import WRITING, writer
 
 REPOSITORY = Path(__file__).parents[2]
-SETUP, SEED, PER_SHARD, EPISODES = "quadratic-30d", 11, 4, 2400
+SETUP = os.environ.get("CHAOS_SETUP", "quadratic-30d")
+SEED, PER_SHARD, EPISODES = 11, 4, 2400
 """Rollouts that cost next to nothing, in 600 files: what kills hit is starting, writing and publishing."""
 PATIENCE = 600.0
 """Seconds after which something that must end is taken to hang."""

@@ -1,6 +1,7 @@
 """`svaedc collect` under random SIGKILLs of whatever takes part in it: the bytes stay the same.
 
-The kills are drawn from a seed that is printed: CHAOS_SEED=N make chaos draws them again.
+The kills are drawn from a seed that is printed: CHAOS_SEED=N make chaos draws them again. CHAOS_SETUP=NAME
+collects of another robot.
 """
 
 import os
