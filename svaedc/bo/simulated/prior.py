@@ -1,11 +1,12 @@
 r"""Gaussian processes that expect of a robot what simulation showed.
 
-    f(x) = a \bar f(x) + b + g(x)
+    f(x) = a \bar f(x) + b + c s(x) + d \bar y(x) + g(x)
 
-\bar f is the mean objective over the simulated worlds, a ~ N(1, `TRUST`^2) how far it is to be trusted, b ~
-N(0, `SHIFT`^2) by how much everything is better or worse than simulated, g a process on x or on latent paths.
-a and b are not fitted to a handful of trials but integrated out: they are terms of the kernel. A mean from
-simulation is that of Cully et al. (Nature 2015); there a is 1 and b 0.
+\bar f is the mean objective over the simulated worlds, s its spread, \bar y the mean badness. a ~ N(1,
+`TRUST`^2) says how far simulation is to be trusted, b ~ N(0, `SHIFT`^2) by how much everything is better or worse
+than simulated, c and d ~ N(0, `TRUST`^2) what it costs on this robot that a candidate depends on luck or is bad.
+g is a process on x or on latent paths. a to d are not fitted to a handful of trials but integrated out: they are
+terms of the kernel. A mean from simulation is that of Cully et al. (Nature 2015); there a is 1, and b to d are 0.
 
 The ensemble takes the robot for one more world, drawn as the simulated ones were:
 
@@ -17,7 +18,7 @@ so that a trial tells which worlds the robot is like, and through them what othe
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import torch
 from gpytorch.kernels import Kernel
@@ -31,91 +32,94 @@ from svaedc.bo.kernels import Embedded
 from svaedc.bo.surrogates import KernelOf, Surrogate
 
 TRUST: Final = 0.5
-"""Standard deviation of a."""
+"""Standard deviation of a, c and d."""
 SHIFT: Final = 0.25
 """Standard deviation of b, in parts of the range of objectives."""
 
-Worlds = Callable[[Tensor], Tensor]
-"""It takes the simulated objectives [..., n, e] out of rows of features."""
+
+class Worlds(NamedTuple):
+    """What simulation showed, taken out of rows of features.
+
+    Attributes:
+        f: Objectives in parts of their range, [..., n, e].
+        y: Badness, [..., n, e].
+    """
+
+    f: Tensor
+    y: Tensor
+
+
+WorldsOf = Callable[[Tensor], Worlds]
 
 
 class SimulatedMean(Mean):
     r"""The mean \bar f(x).
 
     Args:
-        worlds: Takes the simulated objectives out of rows of features.
+        worlds: Takes what simulation showed out of rows of features.
     """
 
-    def __init__(self, worlds: Worlds) -> None:
+    def __init__(self, worlds: WorldsOf) -> None:
         super().__init__()
         self._worlds = worlds
 
     def forward(self, x: Tensor) -> Tensor:
-        """Means [..., n] of rows of features [..., n, k + e]."""
-        return self._worlds(x).mean(dim=-1)
+        """Means [..., n] of rows of features [..., n, k + 2 e]."""
+        return self._worlds(x).f.mean(dim=-1)
 
 
-class Trusted(Kernel):
-    r"""The covariance of a \bar f + b: TRUST^2 \bar f \bar f' + SHIFT^2.
+class LinearKernel(Kernel):
+    """The covariance of a linear function of what simulation showed, with random weights, and of b.
 
     Args:
-        worlds: Takes the simulated objectives out of rows of features.
+        worlds: Takes what simulation showed out of rows of features.
     """
 
-    def __init__(self, worlds: Worlds) -> None:
+    def __init__(self, worlds: WorldsOf) -> None:
         super().__init__()
         self._worlds = worlds
+
+    def regressors(self, worlds: Worlds) -> Tensor:
+        """What the weights belong to, each times the standard deviation of its weight, [..., n, r]."""
+        raise NotImplementedError
 
     def forward(self, x1: Tensor, x2: Tensor, diag: bool = False, **_: Any) -> Tensor:  # noqa: FBT001, FBT002
         """Compute the kernel matrix, as GPyTorch calls it.
 
         Args:
-            x1: Rows of features, [..., n, k + e].
-            x2: Such rows, [..., m, k + e].
+            x1: Rows of features, [..., n, k + 2 e].
+            x2: Such rows, [..., m, k + 2 e].
             diag: Whether only the diagonal is asked for.
             **_: Not used.
 
         Returns:
             The matrix, [..., n, m], or its diagonal, [..., n].
         """
-        one, other = (TRUST * self._worlds(x).mean(dim=-1) for x in (x1, x2))
-        product = one * other if diag else one.unsqueeze(-1) * other.unsqueeze(-2)
-        return product + SHIFT**2
+        one, other = (self.regressors(self._worlds(x)) for x in (x1, x2))
+        return ((one * other).sum(dim=-1) if diag else one @ other.mT) + SHIFT**2
 
 
-class Ensemble(Kernel):
-    r"""The covariance of sum_j w_j (f_j - \bar f) + b: that of the worlds, and SHIFT^2.
+class Trusted(LinearKernel):
+    r"""The covariance of a \bar f + b + c s + d \bar y.
 
-    Args:
-        worlds: Takes the simulated objectives out of rows of features.
+    It is TRUST^2 (\bar f \bar f' + s s' + \bar y \bar y') + SHIFT^2.
     """
 
-    def __init__(self, worlds: Worlds) -> None:
-        super().__init__()
-        self._worlds = worlds
-
-    def forward(self, x1: Tensor, x2: Tensor, diag: bool = False, **_: Any) -> Tensor:  # noqa: FBT001, FBT002
-        """Compute the kernel matrix, as GPyTorch calls it.
-
-        Args:
-            x1: Rows of features, [..., n, k + e].
-            x2: Such rows, [..., m, k + e].
-            diag: Whether only the diagonal is asked for.
-            **_: Not used.
-
-        Returns:
-            The matrix, [..., n, m], or its diagonal, [..., n].
-        """
-        one, other = (_deviations(self._worlds(x)) for x in (x1, x2))
-        product = (one * other).sum(dim=-1) if diag else one @ other.mT
-        return product / one.shape[-1] + SHIFT**2
+    def regressors(self, worlds: Worlds) -> Tensor:
+        """Mean objective, its spread, mean badness."""
+        mean, spread = worlds.f.mean(dim=-1), worlds.f.std(dim=-1, correction=0)
+        return TRUST * torch.stack([mean, spread, worlds.y.mean(dim=-1)], dim=-1)
 
 
-def _deviations(f: Tensor) -> Tensor:
-    return f - f.mean(dim=-1, keepdim=True)
+class Ensemble(LinearKernel):
+    r"""The covariance of sum_j w_j (f_j - \bar f) + b: that of the worlds, and SHIFT^2."""
+
+    def regressors(self, worlds: Worlds) -> Tensor:
+        """How each world differs from their mean."""
+        return (worlds.f - worlds.f.mean(dim=-1, keepdim=True)) / worlds.f.shape[-1] ** 0.5
 
 
-def on_controllers(prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem) -> Surrogate:
+def on_controllers(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
     """The simulated objective as prior mean, and k_0 on x.
 
     Args:
@@ -129,7 +133,7 @@ def on_controllers(prior: type[Trusted] | type[Ensemble], kernel: KernelOf, prob
     return _surrogate(as_they_are(problem), prior, kernel, problem)
 
 
-def on_paths(prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem) -> Surrogate:
+def on_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""The simulated objective as prior mean, and k_0 on \bar\tau.
 
     Args:
@@ -143,9 +147,7 @@ def on_paths(prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: P
     return _on_latents(svae, prior, kernel, problem)
 
 
-def on_compressed_paths(
-    prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem
-) -> Surrogate:
+def on_compressed_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""The simulated objective as prior mean, and k_0 on (1 - \bar y) \bar\tau.
 
     Args:
@@ -161,34 +163,37 @@ def on_compressed_paths(
 
 
 def _on_latents(
-    embedding: Embedding, prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem
+    embedding: Embedding, prior: type[LinearKernel], kernel: KernelOf, problem: Problem
 ) -> Surrogate:
     problem.known_outcomes()
     return _surrogate(by_latents(problem, embedding), prior, kernel, problem)
 
 
 def _surrogate(
-    compared: Candidates, prior: type[Trusted] | type[Ensemble], kernel: KernelOf, problem: Problem
+    compared: Candidates, prior: type[LinearKernel], kernel: KernelOf, problem: Problem
 ) -> Surrogate:
     dimensions = compared.phi.shape[1]
 
-    def worlds(rows: Tensor) -> Tensor:
-        return rows[..., dimensions:]
+    def features(rows: Tensor) -> Tensor:
+        return rows[..., :dimensions]
 
-    def covariance() -> Kernel:
-        return Embedded(kernel(dimensions), lambda rows: rows[..., :dimensions]) + prior(worlds)
+    def worlds(rows: Tensor) -> Worlds:
+        return Worlds(*rows[..., dimensions:].chunk(2, dim=-1))
 
-    candidates = _with_simulations(compared, problem)
-    process = partial(fit, covariance, mean=lambda: SimulatedMean(worlds))
-    return Surrogate(candidates, process, problem.objective_limits)
+    process = partial(
+        fit,
+        lambda: Embedded(kernel(dimensions), features) + prior(worlds),
+        mean=lambda: SimulatedMean(worlds),
+    )
+    return Surrogate(_with_simulations(compared, problem), process, problem.objective_limits)
 
 
 def _with_simulations(candidates: Candidates, problem: Problem) -> Candidates:
-    """The same pool; its features have the scaled objectives of all worlds behind them."""
+    """The same pool; its features have the scaled objectives and the badness in all worlds behind them."""
     simulated = problem.known_outcomes()
 
     def embed(x: Tensor) -> Tensor:
         f = scale_objectives(simulated.objectives(x).double(), problem.objective_limits)
-        return torch.cat([candidates.features_of(x), f], dim=1)
+        return torch.cat([candidates.features_of(x), f, simulated.badness(x).double()], dim=1)
 
     return replace(candidates, phi=embed(torch.tensor(candidates.x).double()), embed=embed, unit=1.0)

@@ -67,17 +67,19 @@ def test_far_from_all_trials_the_process_expects_what_simulation_showed(kind):
 
 
 def test_the_covariances_are_those_of_the_formulas():
-    f = random_worlds().double()
+    f, y = random_worlds().double(), random_worlds(1).double().abs()
+    rows = torch.cat([f, y], dim=1)
 
     def worlds(rows):
-        return rows
+        return prior.Worlds(*rows.chunk(2, dim=-1))
 
-    trusted, ensemble = (kind(worlds)(f).to_dense() for kind in (prior.Trusted, prior.Ensemble))
-    mean = f.mean(dim=1, keepdim=True)
-    assert torch.allclose(trusted, prior.TRUST**2 * mean @ mean.T + prior.SHIFT**2)
+    trusted, ensemble = (kind(worlds)(rows).to_dense() for kind in (prior.Trusted, prior.Ensemble))
+    mean, spread, bad = f.mean(dim=1), f.std(dim=1, correction=0), y.mean(dim=1)
+    products = sum(torch.outer(each, each) for each in (mean, spread, bad))
+    assert torch.allclose(trusted, prior.TRUST**2 * products + prior.SHIFT**2)
     assert torch.allclose(ensemble, torch.cov(f, correction=0) + prior.SHIFT**2)
     for kind, matrix in ((prior.Trusted, trusted), (prior.Ensemble, ensemble)):
-        assert torch.allclose(kind(worlds)(f, diag=True), matrix.diagonal())
+        assert torch.allclose(kind(worlds)(rows, diag=True), matrix.diagonal())
 
 
 def test_a_robot_like_one_of_the_worlds_is_recognised_by_its_trials():
