@@ -3,10 +3,11 @@ r"""Gaussian processes that expect of a robot what simulation showed.
     f(x) = a \bar f(x) + b + c s(x) + d \bar y(x) + g(x)
 
 \bar f is the mean objective over the simulated worlds, s its spread, \bar y the mean badness. a ~ N(1,
-`TRUST`^2) says how far simulation is to be trusted, b ~ N(0, `SHIFT`^2) by how much everything is better or worse
-than simulated, c and d ~ N(0, `TRUST`^2) what it costs on this robot that a candidate depends on luck or is bad.
-g is a process on x or on latent paths. a to d are not fitted to a handful of trials but integrated out: they are
-terms of the kernel. A mean from simulation is that of Cully et al. (Nature 2015); there a is 1, and b to d are 0.
+`TRUST`^2) says how far simulation is to be trusted, b ~ N(0, `SHIFT`^2) by how much everything is better or
+worse than simulated, c and d ~ N(0, `TRUST`^2) what it costs on this robot that a candidate depends on luck
+or is bad. g is a process on x or on latent paths. a to d are not fitted to a handful of trials but
+integrated out: they are terms of the kernel. A mean from simulation is that of Cully et al. (Nature 2015);
+there a is 1, and b to d are 0.
 
 The ensemble takes the robot for one more world, drawn as the simulated ones were:
 
