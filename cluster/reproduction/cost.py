@@ -15,8 +15,9 @@ from typing import Final
 
 from cluster.comparison.records import RunKey, read_trials
 from cluster.config import Settings
+from cluster.optimization.candidates import TABLE
 from cluster.progress import duration
-from cluster.reproduction.plan import Reproduction
+from cluster.reproduction.plan import CANDIDATES, WORLDS, Reproduction
 from cluster.reproduction.recipe import Panel
 
 
@@ -164,6 +165,7 @@ def cost_items(reproduction: Reproduction, settings: Settings, cores: int) -> li
     return [
         *_data(reproduction, settings, cores),
         *_models(reproduction, settings),
+        *_candidates(reproduction, settings, cores),
         *(_panel(reproduction, panel, settings) for panel in reproduction.recipe.panels),
     ]
 
@@ -214,6 +216,21 @@ def _models(reproduction: Reproduction, settings: Settings) -> Iterator[Item]:
         cache = reproduction.cache_size(train) if latent == reproduction.trains[0] else 0
         cost = training(reproduction.recipe.data, preset, latent, updates, cache)
         yield Item(f"train {latent}: {updates} updates, preset {preset}", cost)
+
+
+def _candidates(reproduction: Reproduction, settings: Settings, cores: int) -> Iterator[Item]:
+    """Those that are not there, each once."""
+    wanted = {
+        reproduction.candidates(panel): panel for panel in reproduction.recipe.panels if panel.candidates
+    }
+    for folder, panel in wanted.items():
+        if (folder / TABLE).exists():
+            yield Item(f"candidates in {', '.join(panel.candidates)}: there already", Cost())
+            continue
+        actors, episodes = settings.collect.actor_count(cores), CANDIDATES * WORLDS
+        costs = (collecting(setup, episodes, actors) for setup in panel.candidates)
+        step = f"candidates in {', '.join(panel.candidates)}: {CANDIDATES} x {WORLDS} episodes"
+        yield Item(step, reduce(add, costs, Cost()))
 
 
 def _panel(reproduction: Reproduction, panel: Panel, settings: Settings) -> Item:

@@ -43,6 +43,10 @@ SCALES: Final[Mapping[str, Scale]] = MappingProxyType(
 cores."""
 
 
+CANDIDATES, WORLDS, CANDIDATES_SEED = 2_000, 6, 1
+"""So many candidates are simulated in so many worlds of each setup, for panels that choose among them."""
+
+
 def scale(name: str) -> Scale:
     """The scale of that name.
 
@@ -85,6 +89,12 @@ class Reproduction:
     def comparison(self, panel: Panel) -> Path:
         """Folder of a panel's comparison."""
         return self.results / panel.name
+
+    def candidates(self, panel: Panel) -> Path:
+        """Folder of a panel's candidates, which panels that need the same ones share."""
+        simulated = f"{'+'.join(panel.candidates)}-{CANDIDATES}x{WORLDS}"
+        encoded = f"-by-{self.models[panel.latent].name}" if panel.latent else ""
+        return self.folder / "candidates" / f"{simulated}{encoded}"
 
     def missing_episodes(self) -> int:
         """Still to be collected."""

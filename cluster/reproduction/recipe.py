@@ -22,6 +22,8 @@ class Panel:
         trials: suggested in each run.
         gap: level of the hidden physics.
         latent: size of the model's latent path; "" for methods that need no model.
+        candidates: setups in which candidates are simulated before the trials; none where each run draws a
+            pool of its own.
     """
 
     name: str
@@ -31,9 +33,13 @@ class Panel:
     trials: int = 20
     gap: str = "paper"
     latent: str = NINE
+    candidates: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse methods that lack their model."""
+        """Refuse methods that lack their model or their candidates."""
+        lacking = [name for name in self.methods if methods.needs_candidates(name)]
+        if lacking and not self.candidates:
+            raise ValueError(f"panel {self.name!r} needs candidates for {', '.join(lacking)}, got none")
         needy = [name for name in self.methods if methods.needs_model(name)]
         if needy and not self.latent:
             raise ValueError(f"panel {self.name!r} needs a latent size for {', '.join(needy)}, got none")

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from cluster.candidates.plan import plan_candidates
+from cluster.candidates.simulate import simulate
 from cluster.comparison.compare import Comparison, compare
 from cluster.comparison.plan import Grid, plan_comparison
 from cluster.config import Settings
@@ -11,7 +13,7 @@ from cluster.datasets.collect import collect
 from cluster.datasets.plan import plan_collection
 from cluster.progress import say, timing
 from cluster.reproduction.cost import cost_items, lines
-from cluster.reproduction.plan import Reproduction
+from cluster.reproduction.plan import CANDIDATES, CANDIDATES_SEED, WORLDS, Reproduction
 from cluster.reproduction.recipe import Panel
 from cluster.reproduction.report import Table, publish, table
 from cluster.runtime.placement import free_machines
@@ -115,6 +117,9 @@ def run_steps(
     for latent in reproduction.trains:
         with timing(names.get("train", f"train {latent}")):
             _train(reproduction, latent, settings, session, tracker)
+    for panel in recipe.panels:
+        if panel.candidates:
+            _simulate(reproduction, panel, settings, session, tracker)
     found = {}
     for panel in recipe.panels:
         with timing(names.get("compare", f"compare {panel.name}")):
@@ -147,6 +152,26 @@ def _train(
     )
 
 
+def _simulate(
+    reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
+) -> None:
+    """Simulate the candidates of a panel; where another one has the same, nothing is left to do."""
+    plan = plan_candidates(
+        setups=[setups.load(name) for name in panel.candidates],
+        count=CANDIDATES,
+        episodes=WORLDS,
+        gap="wide",
+        seed=CANDIDATES_SEED,
+        model=reproduction.models[panel.latent] if panel.latent else None,
+        chosen=None,
+        folder=reproduction.candidates(panel),
+        settings=settings.collect,
+    )
+    if not plan.is_whole:
+        with timing(f"simulate candidates in {', '.join(panel.candidates)}"):
+            simulate(plan, settings.collect, session, tracker)
+
+
 def _compare(
     reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
 ) -> Comparison:
@@ -160,5 +185,6 @@ def _compare(
         folder=reproduction.comparison(panel),
         settings=settings.compare,
         caption=f"{recipe.figure}, {panel.name}: {panel.title}" if recipe.figure else "",
+        candidates=reproduction.candidates(panel) if panel.candidates else None,
     )
     return compare(plan, session, tracker)

@@ -17,7 +17,7 @@ from svaedc.bo.acquisition import (
     ucb,
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
-from svaedc.bo.method_names import MethodName, names, needs_model
+from svaedc.bo.method_names import MethodName, names, needs_candidates, needs_model
 from svaedc.bo.simulated import prior
 from svaedc.bo.strategies import (
     BayesianOptimization,
@@ -29,7 +29,7 @@ from svaedc.bo.strategies import (
 )
 from svaedc.bo.surrogates import LEAST_BAD, Surrogate
 
-__all__ = ["build", "names", "needs_model", "require"]
+__all__ = ["build", "names", "needs_candidates", "needs_model", "require"]
 
 SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
     "se": partial(surrogates.on_controllers, kernels.se),

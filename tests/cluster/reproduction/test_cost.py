@@ -1,6 +1,7 @@
 """The cost of a reproduction."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,16 @@ def test_a_damaged_dataset_in_the_way_is_refused_before_its_bill(tmp_path):
     (push.dataset / "dataset.json").write_text("{")
     with pytest.raises(UserError, match="cannot use the dataset"):
         costs(push)
+
+
+def test_panels_that_need_the_same_candidates_share_them_and_they_are_billed_once(tmp_path):
+    panels = [replace(TINY.panels[0], name=name, candidates=("franka",)) for name in ("one", "two")]
+    recipe = replace(TINY, panels=(*panels, replace(panels[0], name="three", candidates=())), claims=())
+    plan = plan_of(recipe, tmp_path)
+    assert {plan.candidates(panel).name for panel in panels} == {"franka-2000x6-by-franka-300-compact-3x3"}
+    simulated = {step: cost for step, cost in costs(plan).items() if "candidates" in step}
+    assert simulated.keys() == {"candidates in franka"}
+    assert simulated["candidates in franka"].core_seconds == pytest.approx(12_000 * 0.027)
 
 
 def test_the_bill_is_the_sum_of_single_costs_and_shrinks_by_what_is_there(tmp_path, few_episodes):

@@ -115,6 +115,8 @@ def test_a_recipe_that_could_never_run_is_refused():
         Panel("one", "", "franka", ("svae",), latent="")
     with pytest.raises(ValueError, match="figure-1 needs data for its models, got none"):
         Recipe("figure-1", "", "", 1, (Panel("one", "", "franka", ("svae",)),), ())
+    with pytest.raises(ValueError, match=r"panel 'one' needs candidates for simulated-best, got none"):
+        Panel("one", "", "franka", ("simulated-best",))
     astray = Claim("better", "section 1", (Gain("two", "se", "random", 1),))
     with pytest.raises(ValueError, match="figure-1 has no panel 'two': better"):
         Recipe("figure-1", "", "", 1, (panel,), (astray,))
