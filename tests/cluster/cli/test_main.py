@@ -14,6 +14,7 @@ from tests.cluster.cli.command_line import svaedc
 COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
 
 COLLECT = ("collect", "--episodes", "8", "--dataset", "data")
+CANDIDATES = ("candidates", "--setup", "franka", "--out", "candidates")
 
 
 def test_help_names_every_command_and_loads_neither_ray_nor_torch(tmp_path):
@@ -112,6 +113,15 @@ def test_a_mistake_is_one_line_where_no_terminal_is(tmp_path):
         ),
         (("reproduce", "figure-9", "--set", "train.latent=15x12"), 2, "leave train.latent out"),
         ((*COMPARE, "--methods", "se,svae"), 2, "svae need a trained model: name its folder with --model"),
+        (
+            (*COMPARE, "--methods", "prior-se,simulated-best"),
+            2,
+            "prior-se, simulated-best need candidates that were simulated",
+        ),
+        ((*COMPARE, "--methods", "se", "--candidates", "nowhere"), 1, "there are no candidates in"),
+        ((*CANDIDATES, "--keep", "worst"), 2, "--keep must be one of best, least-bad, got 'worst'"),
+        ((*CANDIDATES, "--gap", "narrow"), 2, "unknown gap level 'narrow'"),
+        ((*CANDIDATES, "--also", "yumi"), 2, "franka and yumi cannot run the same controllers"),
     ],
 )
 def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
