@@ -2,14 +2,36 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32, Int
 
+from workers.controllers.arrays import constant
 from workers.environments.environment import Channel, Command
 
-__all__ = ["Command", "Controller", "unit_cube"]
+__all__ = ["Command", "Controller", "PlanTimes", "unit_cube"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanTimes:
+    """When plans are told: at the ends of some control steps of an episode.
+
+    Attributes:
+        steps: counted from 1 to the horizon, rising.
+        horizon: T, control steps.
+        control_step: s.
+    """
+
+    steps: Int[np.ndarray, " s"]
+    horizon: int
+    control_step: float
+
+    @property
+    def parts(self) -> Float[np.ndarray, " s"]:
+        """In parts of the episode, in (0, 1]."""
+        return self.steps / self.horizon
 
 
 class Controller(ABC):
@@ -27,6 +49,35 @@ class Controller(ABC):
         low = np.array([parameter.low for parameter in self.parameters])
         high = np.array([parameter.high for parameter in self.parameters])
         return low + x.astype(np.float64) * (high - low)
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """Channels of the plan that `plans` gives; none where a controller offers no plan."""
+        return ()
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What controllers want before the world answers: a function of x alone.
+
+        A model may read it in place of x. It is told in the channels of `planned`, and need not be what the
+        controller commands: a command may answer to the world.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch; gradients reach it.
+            moments: when.
+
+        Returns:
+            The plans at these moments, [n, channels, S], of the same kind as x.
+
+        Raises:
+            NotImplementedError: this controller offers none.
+        """
+        raise NotImplementedError(f"{type(self).__name__} offers no plan: `planned` is empty")
+
+    def physical(self, x: Any) -> Any:
+        """Physical values of many controllers, [n, D] as x, in the units of `parameters`."""
+        low = constant([parameter.low for parameter in self.parameters], x)
+        high = constant([parameter.high for parameter in self.parameters], x)
+        return low + x * (high - low)
 
     @abstractmethod
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32
 
-from workers.controllers.controller import Command, Controller
+from workers.controllers.arrays import constant, namespace
+from workers.controllers.controller import Command, Controller, PlanTimes
 from workers.environments.environment import Channel
 from workers.plans import JointPlan, PlannedCommand
 
@@ -36,16 +37,16 @@ class Gait:
     """The numbers of a pattern generator; rows are base, shoulder and elbow, columns the legs in ring order.
 
     Attributes:
-        shifts: rad; two coupled oscillators are in step when θ + shift is the same for both.
-        frequency: v of each row, in Hz of the oscillators' time.
-        amplitude: R of each row, in rad.
-        offset: o of each row, in rad.
+        shifts: rad, [..., 3, 6]; two coupled oscillators are in step when θ + shift is the same for both.
+        frequency: v of each row, [..., 3], in Hz of the oscillators' time.
+        amplitude: R of each row, [..., 3], in rad.
+        offset: o of each row, [..., 3], in rad.
     """
 
-    shifts: Float[np.ndarray, "3 6"]
-    frequency: Float[np.ndarray, "3"]
-    amplitude: Float[np.ndarray, "3"]
-    offset: Float[np.ndarray, "3"]
+    shifts: Any
+    frequency: Any
+    amplitude: Any
+    offset: Any
 
 
 def phases(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
@@ -76,6 +77,29 @@ def phases(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
     return course - gait.shifts
 
 
+def planned_phases(gait: Gait, steps: np.ndarray) -> Any:
+    """The same for many gaits at once, at some steps, by Euler steps of twice the length.
+
+    Args:
+        gait: numbers of n pattern generators, each field with n in front: arrays of NumPy or torch.
+        steps: at whose ends phases are told, rising.
+
+    Returns:
+        θ in rad, [n, S, 3, 6].
+    """
+    xp, told, course = namespace(gait.shifts), set(steps.tolist()), []
+    base, joints = gait.shifts[:, 0], gait.shifts[:, 1:]
+    free, gain = 2 * TIME_STEP * 2 * pi * gait.frequency[:, :, None], 2 * TIME_STEP * COUPLING
+    for step in range(2, int(steps[-1]) + 2, 2):
+        sine, cosine = xp.sin(base), xp.cos(base)
+        pull = gain * xp.sin(joints - base[:, None])
+        meeting = cosine * sine.sum(1)[:, None] - sine * cosine.sum(1)[:, None]
+        base = base + free[:, 0] + gain * meeting + pull.sum(1)
+        joints = joints + free[:, 1:] - pull
+        course += [xp.concatenate([base[:, None], joints], 1)] * len({step - 1, step} & told)
+    return xp.stack(course, 1) - gait.shifts[:, None]
+
+
 def outputs(gait: Gait, steps: int) -> Float[np.ndarray, "steps 3 6"]:
     """Integrate the oscillators for their outputs R (1 + cos θ) − o.
 
@@ -97,7 +121,7 @@ class PatternGenerator(Controller):
 
     Args:
         parameters: of the controller.
-        gait: from their values to the pattern generator.
+        gait: from their values, [..., D], to the pattern generator.
         directions: +1 or −1 for base, shoulder and elbow.
         limits: greatest commanded angle of base, shoulder and elbow, in rad.
     """
@@ -114,6 +138,33 @@ class PatternGenerator(Controller):
         self._gait = gait
         self._directions = np.array(directions)[:, None]
         self._limits = np.array(limits)
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """The commanded angle of every joint."""
+        legs = [LEGS[place] for place in _COMMAND_LEGS]
+        kinds = list(zip(KINDS, self._limits.tolist(), strict=True))
+        return tuple(Channel(f"{leg}_{kind}", "rad", -limit, limit) for leg in legs for kind, limit in kinds)
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What is commanded, integrated with half as many steps.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch.
+            moments: when.
+
+        Returns:
+            The channels of `planned`, [n, 18, S].
+        """
+        xp, gait = namespace(x), self._gait(self.physical(x))
+        course = planned_phases(gait, moments.steps)
+        swing = gait.amplitude[:, None, :, None] * (1 + xp.cos(course)) - gait.offset[:, None, :, None]
+        center = constant([[0.0], [0.0], [ELBOW_CENTER]], x)
+        left = constant(self._directions, x) * swing + center
+        angles = left[:, :, :, _COMMAND_LEGS] * constant(_SIDES, x)
+        limits = constant(self._limits[:, None], x)
+        held = xp.swapaxes(xp.minimum(xp.maximum(angles, -limits), limits), 2, 3)
+        return xp.swapaxes(held.reshape(len(x), len(moments.steps), -1), 1, 2)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
         """Plan all commands at once: nothing that happens to the robot changes them.
@@ -150,9 +201,9 @@ class PatternGenerator(Controller):
         return np.clip(angles, -self._limits, self._limits).reshape(horizon, -1)
 
 
-def _shifts(base: Float[np.ndarray, "6"], joints: Float[np.ndarray, "2 #6"]) -> Float[np.ndarray, "3 6"]:
-    """Base phases, and by how much each shoulder and elbow lags behind its base."""
-    return np.vstack([-base, joints - base])
+def _shifts(base: Any, joints: Any) -> Any:
+    """Base phases [..., 1, 6]; each shoulder and elbow [..., 2, 6 or 1] lags behind its base by so much."""
+    return namespace(base).concatenate([-base, joints - base], -2)
 
 
 def _phase(*names: str) -> tuple[Channel, ...]:
@@ -168,9 +219,9 @@ def cpg_27d(limits: tuple[float, float, float]) -> PatternGenerator:
     waves = [("frequency", "Hz", 2.0), ("amplitude", "rad", 1.0), ("offset", "rad", 1.0)]
     shared = (Channel(f"{kind}_{name}", unit, 0.0, high) for name, unit, high in waves for kind in KINDS)
 
-    def gait(values: Float[np.ndarray, "27"]) -> Gait:
-        shifts = _shifts(values[:6], values[6:18].reshape(2, 6))
-        return Gait(shifts, *values[18:].reshape(3, 3))
+    def gait(values: Any) -> Gait:
+        shifts = _shifts(values[..., None, :6], values[..., 6:18].reshape(*values.shape[:-1], 2, 6))
+        return Gait(shifts, values[..., 18:21], values[..., 21:24], values[..., 24:])
 
     parameters = (*BASE_PHASES, *joints, *shared)
     return PatternGenerator(parameters=parameters, gait=gait, directions=(1.0, 1.0, 1.0), limits=limits)
@@ -184,9 +235,9 @@ def cpg_11d(limits: tuple[float, float, float]) -> PatternGenerator:
         Channel("offset", "rad", 0.5, 1.0),
     )
 
-    def gait(values: Float[np.ndarray, "11"]) -> Gait:
-        shifts = _shifts(values[:6], values[6:8, None])
-        return Gait(shifts, *np.repeat(values[8:, None], 3, axis=1))
+    def gait(values: Any) -> Gait:
+        shifts = _shifts(values[..., None, :6], values[..., 6:8, None])
+        return Gait(shifts, *(values[..., [place] * 3] for place in (8, 9, 10)))
 
     parameters = (*BASE_PHASES, *_phase(*KINDS[1:]), *waves)
     return PatternGenerator(parameters=parameters, gait=gait, directions=(-1.0, -1.0, 1.0), limits=limits)

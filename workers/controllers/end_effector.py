@@ -2,17 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
 
-from workers.controllers.controller import Command, Controller
-from workers.controllers.reference import ends, euler_angles, reference
+from workers.controllers.arrays import constant, namespace
+from workers.controllers.controller import Command, Controller, PlanTimes
+from workers.controllers.reference import ends, euler_angles, line_through, motion_through, reference
 from workers.environments.environment import Channel
 from workers.environments.tabletop import ArmScene
 from workers.plans import HandPlan, PlannedCommand
 
 Triple = tuple[float, float, float]
+
+_ANGLES = ("roll", "pitch", "yaw")
+_FAST = 5.0  # m in an episode's time; few plans are faster
+_FAR = 1.0  # m
+_NEAR = 1e-3  # m; a distance has a derivative at 0, too
 
 # Columns of a planned step.
 _POSITION, _VELOCITY, _ACCELERATION = slice(0, 3), slice(3, 6), slice(6, 9)
@@ -56,6 +63,9 @@ class EndEffectorWaypoints(Controller):
         ranges: of each waypoint's parameters.
         turning: Kp in N·m/rad and Kd in N·m·s/rad of the hand's orientation.
         torque_limits: N·m of each joint; commands never leave them.
+        home: position (m) and roll, pitch, yaw (rad) of the hand where an episode begins; `plans` tells from
+            here what is wanted up to the first waypoint.
+        objects: x and y in m of what is on the table at first; a plan tells how far the hand is from each.
     """
 
     def __init__(
@@ -65,11 +75,55 @@ class EndEffectorWaypoints(Controller):
         ranges: WaypointRanges,
         turning: tuple[float, float],
         torque_limits: tuple[float, ...],
+        home: tuple[float, ...],
+        objects: tuple[tuple[float, float], ...],
     ) -> None:
         self.parameters = tuple(c for n in range(1, waypoints + 1) for c in ranges.channels(n))
+        self._ranges = ranges
+        self._home = home
+        self._objects = objects
         self._waypoints = waypoints
         self._turning = turning
         self._limits = torque_limits
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """The hand's pose and velocity, both gains, and distances to the objects."""
+        ranges, (low, high) = self._ranges, (-_FAST, _FAST)
+        pose = zip("xyz", ranges.position, strict=True), zip(_ANGLES, ranges.orientation, strict=True)
+        return (
+            *(Channel(f"hand_{axis}", "m", *interval) for axis, interval in pose[0]),
+            *(Channel(f"hand_v{axis}", "m/episode", low, high) for axis in "xyz"),
+            *(Channel(f"hand_{angle}", "rad", *interval) for angle, interval in pose[1]),
+            Channel("stiffness", "N/m", *ranges.stiffness),
+            Channel("damping", "N·s/m", *ranges.damping),
+            *(Channel(f"distance_{number}", "m", 0.0, _FAR) for number, _ in enumerate(self._objects, 1)),
+        )
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What the hand wants: pose, velocity, gains, and how far it will be from where objects start.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch.
+            moments: when.
+
+        Returns:
+            The channels of `planned`, [n, channels, S].
+        """
+        xp, times = namespace(x), moments.parts
+        points = self.physical(x).reshape(len(x), self._waypoints, 8)
+        home = constant(self._home, x) + 0.0 * points[:, :1, :6]
+        corners = xp.concatenate([home, points[:, :, :6]], 1)
+        position, velocity = motion_through(corners[:, :, :3], times)
+        angles = line_through(corners[:, :, 3:], times)
+        leg = np.minimum((times * self._waypoints - 1e-9).astype(int), self._waypoints - 1)
+        gains = xp.swapaxes(points[:, leg, 6:], 1, 2)
+        far = [
+            ((position[:, 0] - px) ** 2 + (position[:, 1] - py) ** 2 + _NEAR**2) ** 0.5
+            for px, py in self._objects
+        ]
+        distances = [xp.stack(far, 1)] if far else []
+        return xp.concatenate([position, velocity, angles, gains, *distances], 1)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: ArmScene, horizon: int) -> Command:
         """Plan from the hand's present pose; the command of a step reads the arm's state at that step.

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32
 
-from workers.controllers.controller import Command, Controller
+from workers.controllers.arrays import constant, namespace
+from workers.controllers.controller import Command, Controller, PlanTimes
 from workers.controllers.reference import minimum_jerk
 from workers.environments.environment import Channel
 from workers.environments.tabletop import ArmScene
@@ -42,11 +44,48 @@ class JointSpeedWaypoints(Controller):
         upper: tuple[float, ...],
     ) -> None:
         self._waypoints = waypoints
+        self._joints = joints
         self._limits = np.array(speed_limits)
         self._lower = lower
         self._upper = upper
         speeds = [(joint, limit) for joint, limit in zip(joints, speed_limits, strict=True)]
         self.parameters = tuple(chain.from_iterable(_channels(n, speeds) for n in range(1, waypoints + 1)))
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """Speed of each joint, and the angle that it would lead to."""
+        limits = dict(zip(self._joints, self._limits.tolist(), strict=True))
+        return (
+            *(Channel(f"{joint}_speed", "rad/s", -limit, limit) for joint, limit in limits.items()),
+            *(Channel(f"{joint}_turn", "rad", -limit, limit) for joint, limit in limits.items()),
+        )
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What the joints want, whatever their limits: their speeds, and how far these turn them.
+
+        A sum over waypoints: each adds its change of speed, which rises from 0 to 1 during its share of the
+        episode.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch.
+            moments: when.
+
+        Returns:
+            The channels of `planned`, [n, channels, S].
+        """
+        xp = namespace(x)
+        points = self.physical(x).reshape(len(x), self._waypoints, -1)
+        speeds, shares = points[:, :, :-1], points[:, :, -1]
+        changes = xp.concatenate([speeds[:, :1], speeds[:, 1:] - speeds[:, :-1]], 1)
+        durations = shares / shares.sum(1)[:, None]
+        begins = xp.cumsum(durations, 1) - durations
+        s = (constant(moments.parts, x)[None, :, None] - begins[:, None]) / durations[:, None]
+        inside, after = xp.clip(s, 0.0, 1.0), xp.clip(s - 1.0, 0.0, None)
+        rise = 10 * inside**3 - 15 * inside**4 + 6 * inside**5
+        area = (2.5 * inside**4 - 3 * inside**5 + inside**6 + after) * durations[:, None]
+        seconds = moments.horizon * moments.control_step
+        both = [rise @ changes, seconds * (area @ changes)]
+        return xp.concatenate([xp.swapaxes(part, 1, 2) for part in both], 1)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: ArmScene, horizon: int) -> Command:
         """Plan all speeds; the command of a step reads the joints at that step.

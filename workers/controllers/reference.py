@@ -1,7 +1,11 @@
 """What the hand should do at every control step: minimum-jerk positions, linear orientations, their rates."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
+
+from workers.controllers.arrays import constant, namespace
 
 
 def ends(horizon: int, waypoints: int) -> np.ndarray:
@@ -68,6 +72,41 @@ def minimum_jerk(
     velocity = (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
     acceleration = (b - a) * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
     return position, velocity, acceleration
+
+
+def motion_through(corners: Any, times: np.ndarray) -> tuple[Any, Any]:
+    """Minimum-jerk motion of many bodies through their corners, each after an equal share of the episode.
+
+    Args:
+        corners: [n, points, d], an array of NumPy or torch.
+        times: in parts of the episode, in (0, 1], [S].
+
+    Returns:
+        Position and velocity, [n, d, S] each, in the units of `corners`, and of those per episode.
+    """
+    legs = corners.shape[1] - 1
+    leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
+    s = constant(times * legs - leg, corners)
+    a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
+    position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return position, (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) * legs
+
+
+def line_through(corners: Any, times: np.ndarray) -> Any:
+    """Straight lines through corners, each after an equal share of the episode.
+
+    Args:
+        corners: [n, points, d], an array of NumPy or torch.
+        times: in parts of the episode, in (0, 1], [S].
+
+    Returns:
+        Values, [n, d, S], in the units of `corners`.
+    """
+    legs = corners.shape[1] - 1
+    leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
+    s = constant(times * legs - leg, corners)
+    a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
+    return a + s * (b - a)
 
 
 def quaternions(euler: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, "time 4"]:

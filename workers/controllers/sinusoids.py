@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from math import pi
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32
 
-from workers.controllers.controller import Command, Controller
+from workers.controllers.arrays import constant, namespace
+from workers.controllers.controller import Command, Controller, PlanTimes
 from workers.environments.environment import Channel, Environment
 
 
@@ -29,12 +31,35 @@ class Sinusoids(Controller):
         for name, share in (("amplitude", amplitude), ("center", center)):
             if not 0.0 < share <= 1.0:
                 raise ValueError(f"{name} must be a share of half a range, in (0, 1], got {share}")
+        self._action = tuple(action)
         self._low = np.array([channel.low for channel in action])
         self._high = np.array([channel.high for channel in action])
         self.parameters = (
             Channel("frequency", "Hz", *frequency),
             *(part for channel in action for part in _parameters(channel, amplitude, center)),
         )
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """The commands."""
+        return self._action
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What is commanded.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch.
+            moments: when.
+
+        Returns:
+            The channels of `planned`, [n, channels, S].
+        """
+        xp, values = namespace(x), self.physical(x)
+        seconds = constant((moments.steps - 1) * moments.control_step, x)
+        amplitude, phase, center = (values[:, first::3, None] for first in (1, 2, 3))
+        commands = center + amplitude * xp.sin(2 * pi * values[:, :1, None] * seconds + phase)
+        low, high = (constant(limits[:, None], x) for limits in (self._low, self._high))
+        return xp.minimum(xp.maximum(commands, low), high)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Environment, horizon: int) -> Command:
         """Plan all commands at once: nothing that happens to the robot changes them.

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32
 
-from workers.controllers.controller import Command, Controller
+from workers.controllers.controller import Command, Controller, PlanTimes
+from workers.controllers.reference import line_through
 from workers.environments.environment import Channel
 
 
@@ -25,6 +26,7 @@ class Waypoints(Controller):
         if count < 2:
             raise ValueError(f"count must be at least 2 waypoints, a first and a last, got {count}")
         self._count = count
+        self._action = tuple(action)
         self._low = np.array([channel.low for channel in action])
         self._high = np.array([channel.high for channel in action])
         self.parameters = tuple(
@@ -32,6 +34,25 @@ class Waypoints(Controller):
             for number in range(1, count + 1)
             for channel in action
         )
+
+    @property
+    def planned(self) -> tuple[Channel, ...]:
+        """The commands."""
+        return self._action
+
+    def plans(self, x: Any, moments: PlanTimes) -> Any:
+        """What is commanded.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch.
+            moments: when.
+
+        Returns:
+            The channels of `planned`, [n, channels, S].
+        """
+        points = self.physical(x).reshape(len(x), self._count, -1)
+        last = max(moments.horizon - 1, 1)  # the first waypoint is the command of the first step
+        return line_through(points, (moments.steps - 1) / last)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
         """Plan all commands at once: nothing that happens to the robot changes them.

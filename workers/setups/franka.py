@@ -57,6 +57,8 @@ WAYPOINTS = WaypointRanges(
 )
 
 
+HOME = (0.2295, 0.2908, 0.2048, 3.0248, 0.2527, -0.0150)
+"""The hand's pose at the home angles: m, then roll, pitch and yaw in rad."""
 SPEED_LIMIT = 2.175
 """Joints 1 to 4 of the real arm reach this speed, in rad/s; the others may reach 2.61, but Bullet has one
 limit for all."""
@@ -96,7 +98,12 @@ def _pushing(name: str, model: TabletopModel) -> Setup:
         name=name,
         build=partial(Tabletop, model),
         controller=EndEffectorWaypoints(
-            waypoints=6, ranges=WAYPOINTS, turning=(1.0, 0.1), torque_limits=TORQUE_LIMITS
+            waypoints=6,
+            ranges=WAYPOINTS,
+            turning=(1.0, 0.1),
+            torque_limits=TORQUE_LIMITS,
+            home=HOME,
+            objects=STARTS,
         ),
         task=task,
         observation=model.observation(),
