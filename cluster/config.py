@@ -86,7 +86,7 @@ class CollectSettings(Section):
 
 
 CHANGEABLE = (
-    *("model", "latent", "distribution", "head"),
+    *("model", "latent", "distribution", "head", "prior"),
     *("weighting", "kl_weight", "learning_rate", "epoch_updates", "patience"),
 )
 """These settings of training belong to the preset unless they are given."""
@@ -130,6 +130,9 @@ class TrainSettings(Section):
     """All four distributions are of this family."""
     head: Literal["preset", "low-rank", "dense"] = "preset"
     """p(xi|tau) has this kind of output."""
+    prior: Literal["preset", "mlp", "deconv", "plan"] = "preset"
+    """p(tau,psi|x) reads x; `plan` reads as a sequence what a controller wants before the world answers, of
+    robots whose controllers say so."""
     weighting: Literal["preset", "paper", "hybrid", "balanced"] = "preset"
     """The bound's terms have the paper's weights; `hybrid` adds generation from x, `balanced` more weight on
     y too."""

@@ -1,6 +1,6 @@
 """A trained model that a user names, by its folder or its file: the one place where one is loaded."""
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,6 +9,35 @@ from svaedc.model import checkpoint
 from svaedc.model.svae_dc import SvaeDc
 from workers.setups import load
 from workers.setups.declared import changes, declaration, list_changes
+
+
+def let_read_plans(model: SvaeDc, setup: str) -> SvaeDc:
+    """Let a model whose p(tau, psi|x) reads plans have those of its robot; others stay as they are.
+
+    Args:
+        model: of any kind.
+        setup: name of the one whose controllers it knows.
+
+    Returns:
+        The same model.
+
+    Raises:
+        UserError: there is no such setup here, or its controllers offer no plan of this size.
+    """
+    if not model.reads_plans:
+        return model
+    try:
+        found = load(setup)
+    except LookupError as error:
+        raise UserError(f"cannot use the model, which reads plans of {setup!r}: {error.args[0]}") from error
+    planned = len(found.controller.planned)
+    if planned != model.config.plan_channels:
+        raise UserError(
+            f"cannot use the model: it reads plans of {model.config.plan_channels} channels, those of "
+            f"{setup} have {planned}; train one anew"
+        )
+    model.read_plans(partial(found.plans, samples=model.config.plan_steps))
+    return model
 
 
 class TrainedModel(NamedTuple):
@@ -25,13 +54,14 @@ def load_model(path: Path | str) -> TrainedModel:
     `model.latent_means(x)` gives latent paths and badness of controllers.
 
     Raises:
-        UserError: it cannot be read.
+        UserError: it cannot be read, or reads plans of a setup that is not here.
     """
     file = checkpoint.checkpoint_path(Path(path))
     try:
         model, metadata = checkpoint.load(file)
     except (FileNotFoundError, ValueError) as error:
         raise UserError(f"cannot use the model: {error}") from error
+    let_read_plans(model, str(metadata.get("setup")))
     return TrainedModel(file, model.requires_grad_(requires_grad=False), metadata)
 
 

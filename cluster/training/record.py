@@ -8,6 +8,7 @@ from typing import Any
 
 from cluster.errors import UserError
 from cluster.files import read_json, write_json
+from cluster.optimization.models import let_read_plans
 from cluster.progress import say
 from cluster.rendering.model_frames import write_remarkable
 from cluster.tracking import Run, log_model
@@ -43,6 +44,7 @@ def record(
         UserError: the MLflow store cannot be used.
     """
     model, metadata = checkpoint.load(job.model / MODEL)
+    let_read_plans(model, job.origin["setup"])
     _, held_out = episodes(cache)
     metrics = diagnostics.evaluate(model, held_out)
     collapsed = diagnostics.collapse(metrics) or ""
@@ -54,8 +56,7 @@ def record(
     for picture in pictures:
         run.figure(picture)
     run.file(job.model / MODEL)
-    sizes = model.config.controller_dim, model.config.tau_size
-    log_model(run, job.model / MODEL, *sizes, step=metadata["update"])
+    log_model(run, job.model / MODEL, model, step=metadata["update"])
     run.dict("model", summary)
     run.tags({"svaedc.collapsed": collapsed or "no"})
     write_json(job.model / MEASURES, summary)

@@ -13,6 +13,7 @@ import torch
 from ray.train.collective import broadcast_from_rank_zero
 from ray.train.torch import get_device, prepare_model
 
+from cluster.optimization.models import let_read_plans
 from svaedc.data.episodes import Episodes, split
 from svaedc.data.samplers import Balanced, Order, WorkerRank, uniform
 from svaedc.model import checkpoint
@@ -24,6 +25,7 @@ from svaedc.training.presets import Preset, Sizes, preset, vary
 from workers.dataset.cache import TrainingCache, training_cache
 from workers.dataset.folder import open_dataset
 from workers.dataset.storage.location import Location
+from workers.setups import load
 
 MODEL = checkpoint.FILE
 STATE = "training.pt"
@@ -89,7 +91,8 @@ class TrainingJob:
 
     def settings(self, cache: TrainingCache) -> Preset:
         """The preset for this data, with the job's seed and budget."""
-        sizes = Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2])
+        planned = planned_channels(self.origin["setup"]) if self.changes.get("prior") == "plan" else 0
+        sizes = Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2], planned)
         made = vary(preset(self.preset)(sizes), self.changes)
         training = replace(made.training, seed=self.seed)
         if self.updates:
@@ -102,6 +105,11 @@ class TrainingJob:
             return uniform
         quantity = {"y": cache.y, "f": cache.f}[self.balance]
         return Balanced(np.asarray(quantity[cache.training()]))
+
+
+def planned_channels(setup: str) -> int:
+    """How many channels the plans of a setup's controllers have; 0 where they offer none."""
+    return len(load(setup).controller.planned)
 
 
 def episodes(cache: TrainingCache) -> tuple[Episodes, Episodes]:
@@ -160,6 +168,7 @@ def _train(
     training, held_out = episodes(cache)
     settings = job.settings(cache)
     model = initialized_model(settings.model, training, bounds(job.dataset), job.seed).to(device)
+    let_read_plans(model, job.origin["setup"])
     state = saved_state(job)
     update = 0 if state is None else updates_in(state, settings.training)
     if is_first:

@@ -15,7 +15,7 @@ _CHOICES: Final = {
     "distribution": ("laplace", "gaussian"),
     "head": ("low-rank", "dense"),
     "trunk": ("mlp", "deconv"),
-    "prior": ("mlp", "deconv"),
+    "prior": ("mlp", "deconv", "plan"),
     "posterior_input": ("residual", "scaled"),
 }
 _SIZES: Final = (
@@ -56,7 +56,8 @@ class ModelConfig:
         distribution: Family of all four networks, `laplace` (the paper) or `gaussian`.
         head: Output of p(xi|tau): `dense` (the paper) or `low-rank` (ours).
         trunk: Hidden layers of p(xi|tau): `deconv` (the paper) or `mlp` (ours).
-        prior: p(tau, psi|x): `deconv` (the paper) or `mlp` (ours).
+        prior: p(tau, psi|x): `deconv` (the paper), `mlp` (ours), or `plan` (ours), which reads as a sequence
+            what the controller wants before the world answers.
         posterior_input: What q sees of xi: `scaled` to the observation range (the paper), or the `residual`
             around the per-step median in units of each dimension's spread (ours).
         channels: Convolution channels of q, reversed in the `deconv` trunk of p(xi|tau).
@@ -68,6 +69,8 @@ class ModelConfig:
         observation_scale: Bounds of the scales of xi: in units of the mean absolute residual of each
             dimension for `low-rank`, of the observation range for `dense`.
         badness_scale: Bounds of the scale of y.
+        plan_channels: Channels of a controller's plan, for the prior `plan`; 0 for the others.
+        plan_steps: Samples of a plan.
     """
 
     controller_dim: int
@@ -89,6 +92,8 @@ class ModelConfig:
     latent_scale: ScaleBounds = ScaleBounds(1e-2, 100.0)
     observation_scale: ScaleBounds = ScaleBounds(0.1, 10.0)
     badness_scale: ScaleBounds = ScaleBounds(1e-2, 1.0)
+    plan_channels: int = 0
+    plan_steps: int = 50
 
     def __post_init__(self) -> None:
         """Refuse unknown choices and sizes no network can be built from."""
@@ -101,6 +106,11 @@ class ModelConfig:
             raise ValueError(f"psi_dim must be at least 1, or 0 for the SVAE, got {self.psi_dim}")
         for name in ("channels", "decoder_hidden", "prior_hidden", "badness_hidden"):
             _require_positive(name, getattr(self, name))
+        if self.prior == "plan" and (self.plan_channels < 1 or self.plan_steps < 1):
+            raise ValueError(
+                "the prior `plan` needs a controller that offers its plan, got one of "
+                f"{self.plan_channels} channels and {self.plan_steps} steps: choose the prior `mlp`"
+            )
         if encoded_length(self.time_steps, len(self.channels)) < 1:
             raise ValueError(
                 f"time_steps must be long enough for {len(self.channels)} convolutions of width {KERNEL} and "

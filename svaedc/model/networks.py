@@ -1,6 +1,6 @@
 """The networks of q(tau, psi|xi, y), p(tau, psi|x) and p(y|psi)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Final, final
 
@@ -138,7 +138,37 @@ class Badness(nn.Module):
         )
 
 
-PRIORS = {"mlp": MlpPrior, "deconv": DeconvPrior}
+PlanOf = Callable[[Tensor], Tensor]
+"""It gives the plans [batch, channels, steps] of controllers [batch, D], about -1 to 1; gradients reach x."""
+
+
+@final
+class PlanPrior(nn.Module):
+    """p(tau, psi|x) that reads a controller's plan as a sequence, a departure: x hides what a plan shows.
+
+    Recurrent layers (GRU) as wide as `prior_hidden` says; the latent code is read from the last state, from
+    the mean over time and from x. What computes plans is code of the robot, and no part of the weights.
+    """
+
+    def __init__(self, config: ModelConfig) -> None:
+        """Build from the sizes in `config`; `plan_of` is to be set before use."""
+        super().__init__()
+        self.plan_of: PlanOf | None = None
+        width, layers = config.prior_hidden[0], len(config.prior_hidden)
+        self.recurrent = nn.GRU(config.plan_channels, width, layers, batch_first=True)
+        self.dropout = nn.Dropout(0.0)
+        self.latent = LatentHead(2 * width + config.controller_dim, config)
+
+    def forward(self, x: Float[Tensor, "batch controller"]) -> Diagonal:
+        """Distribution of the latent code of each controller."""
+        if self.plan_of is None:
+            raise RuntimeError("this model reads plans: set plan_of to what computes those of its robot")
+        states, _ = self.recurrent(self.plan_of(x).swapaxes(1, 2))
+        features = torch.cat([states[:, -1], states.mean(dim=1), 2.0 * x - 1.0], dim=1)
+        return self.latent(self.dropout(features))
+
+
+PRIORS = {"mlp": MlpPrior, "deconv": DeconvPrior, "plan": PlanPrior}
 
 
 @final

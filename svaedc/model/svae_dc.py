@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from svaedc.data.episodes import Episodes
 from svaedc.model.config import ModelConfig
 from svaedc.model.distributions import Diagonal, kl_divergence
-from svaedc.model.networks import HEADS, PRIORS, Badness, DenseHead, Encoder, LowRankHead
+from svaedc.model.networks import HEADS, PRIORS, Badness, DenseHead, Encoder, LowRankHead, PlanOf, PlanPrior
 from svaedc.model.normalizer import POSTERIOR_INPUTS, Normalizer, measure
 
 STATISTICS_SAMPLE: Final = 2_000
@@ -52,6 +52,31 @@ class SvaeDc(nn.Module):
         self.prior_network = PRIORS[config.prior](config)
         self.decoder: DenseHead | LowRankHead = HEADS[config.head](config)
         self.badness = Badness(config) if config.has_psi else None
+
+    @property
+    def reads_plans(self) -> bool:
+        """Whether p(tau, psi|x) reads what a controller wants, which code of the robot computes."""
+        return isinstance(self.prior_network, PlanPrior)
+
+    def known_plan_of(self) -> PlanOf:
+        """What computes plans.
+
+        Raises:
+            TypeError: This model reads none, or nobody has said what computes them.
+        """
+        plan_of = self.prior_network.plan_of if isinstance(self.prior_network, PlanPrior) else None
+        if plan_of is None:
+            raise TypeError("this model reads no plans, or is to be told by read_plans what computes them")
+        return plan_of
+
+    def read_plans(self, plan_of: PlanOf) -> None:
+        """Say what computes plans; a model that reads none ignores it.
+
+        Args:
+            plan_of: Plans [batch, channels, steps] of controllers [batch, D], about -1 to 1.
+        """
+        if isinstance(self.prior_network, PlanPrior):
+            self.prior_network.plan_of = plan_of
 
     def forward(
         self,

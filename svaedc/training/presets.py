@@ -12,11 +12,19 @@ from svaedc.training.config import WEIGHTINGS, StageSettings, TrainingSettings
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes a dataset fixes: D of x, channels of xi and steps of xi after the training stride."""
+    """Sizes that are not chosen.
+
+    Attributes:
+        controller_dim: D of x.
+        observation_dim: Channels of xi.
+        time_steps: Steps of xi after the training stride.
+        plan_channels: Of what the controller wants; 0 where it offers no plan, or none is asked for.
+    """
 
     controller_dim: int
     observation_dim: int
     time_steps: int
+    plan_channels: int = 0
 
 
 class Preset(NamedTuple):
@@ -44,6 +52,7 @@ def paper(sizes: Sizes) -> Preset:
         posterior_input="scaled",
         prior_hidden=(512, 256, 128, 128),
         observation_scale=ScaleBounds(1e-3, 10.0),
+        plan_channels=sizes.plan_channels,
     )
     joint = StageSettings(
         updates=100_000,
@@ -78,7 +87,12 @@ def compact(sizes: Sizes) -> Preset:
         gradient_norm=1.0,
     )
     prior = replace(joint, updates=0, dropout=0.3, weight_decay=1e-2)
-    model = ModelConfig(sizes.controller_dim, sizes.observation_dim, sizes.time_steps)
+    model = ModelConfig(
+        sizes.controller_dim,
+        sizes.observation_dim,
+        sizes.time_steps,
+        plan_channels=sizes.plan_channels,
+    )
     return Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["hybrid"], batch_size=128))
 
 
@@ -118,6 +132,13 @@ LATENT_SIZES: Final = {
 }
 """These are K x tau_dim and hidden sizes: the paper has 9-D everywhere but for its larger 30-D space
 (hidden 256) and a 180-D one (hidden up to 1024)."""
+
+
+_PRIOR_HIDDEN: Final = {
+    "mlp": (384, 384, 384),
+    "deconv": (512, 256, 128, 128),
+    "plan": (160, 160),
+}
 
 
 def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
@@ -176,6 +197,11 @@ def _head(preset: Preset, value: str) -> Preset:
     return preset._replace(model=replace(preset.model, head=value))
 
 
+def _prior(preset: Preset, value: str) -> Preset:
+    hidden = _chosen("prior", value, _PRIOR_HIDDEN)
+    return preset._replace(model=replace(preset.model, prior=value, prior_hidden=hidden))
+
+
 def _weighting(preset: Preset, value: str) -> Preset:
     weighting = _chosen("weighting", value, WEIGHTINGS)
     return preset._replace(training=replace(preset.training, weighting=weighting))
@@ -206,6 +232,7 @@ VARIATIONS: Final[dict[str, Callable[[Preset, Any], Preset]]] = {
     "latent": _latent,
     "distribution": _distribution,
     "head": _head,
+    "prior": _prior,
     "weighting": _weighting,
     "kl_weight": _kl_weight,
     "learning_rate": _learning_rate,

@@ -164,7 +164,7 @@ class PatternGenerator(Controller):
         angles = left[:, :, :, _COMMAND_LEGS] * constant(_SIDES, x)
         limits = constant(self._limits[:, None], x)
         held = xp.swapaxes(xp.minimum(xp.maximum(angles, -limits), limits), 2, 3)
-        return xp.swapaxes(held.reshape(len(x), len(moments.steps), -1), 1, 2)
+        return xp.swapaxes(held.reshape(x.shape[0], len(moments.steps), -1), 1, 2)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: Any, horizon: int) -> Command:  # noqa: ARG002
         """Plan all commands at once: nothing that happens to the robot changes them.

@@ -111,7 +111,7 @@ class EndEffectorWaypoints(Controller):
             The channels of `planned`, [n, channels, S].
         """
         xp, times = namespace(x), moments.parts
-        points = self.physical(x).reshape(len(x), self._waypoints, 8)
+        points = self.physical(x).reshape(x.shape[0], self._waypoints, 8)
         home = constant(self._home, x) + 0.0 * points[:, :1, :6]
         corners = xp.concatenate([home, points[:, :, :6]], 1)
         position, velocity = motion_through(corners[:, :, :3], times)

@@ -74,7 +74,7 @@ class JointSpeedWaypoints(Controller):
             The channels of `planned`, [n, channels, S].
         """
         xp = namespace(x)
-        points = self.physical(x).reshape(len(x), self._waypoints, -1)
+        points = self.physical(x).reshape(x.shape[0], self._waypoints, -1)
         speeds, shares = points[:, :, :-1], points[:, :, -1]
         changes = xp.concatenate([speeds[:, :1], speeds[:, 1:] - speeds[:, :-1]], 1)
         durations = shares / shares.sum(1)[:, None]

@@ -84,7 +84,7 @@ def motion_through(corners: Any, times: np.ndarray) -> tuple[Any, Any]:
     Returns:
         Position and velocity, [n, d, S] each, in the units of `corners`, and of those per episode.
     """
-    legs = corners.shape[1] - 1
+    legs = int(corners.shape[1]) - 1
     leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
     s = constant(times * legs - leg, corners)
     a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
@@ -102,7 +102,7 @@ def line_through(corners: Any, times: np.ndarray) -> Any:
     Returns:
         Values, [n, d, S], in the units of `corners`.
     """
-    legs = corners.shape[1] - 1
+    legs = int(corners.shape[1]) - 1
     leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
     s = constant(times * legs - leg, corners)
     a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))

@@ -50,7 +50,7 @@ class Waypoints(Controller):
         Returns:
             The channels of `planned`, [n, channels, S].
         """
-        points = self.physical(x).reshape(len(x), self._count, -1)
+        points = self.physical(x).reshape(x.shape[0], self._count, -1)
         last = max(moments.horizon - 1, 1)  # the first waypoint is the command of the first step
         return line_through(points, (moments.steps - 1) / last)
 

@@ -3,9 +3,13 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from workers import plain
-from workers.controllers.controller import Controller
+from workers.controllers.arrays import constant
+from workers.controllers.controller import Controller, PlanTimes
 from workers.environments.environment import Channel, Environment
 from workers.physics import PhysicsRanges, ranges
 from workers.setups.names import require_known
@@ -129,6 +133,28 @@ class Setup:
         """
         bits = self.stop is not never and not self.task.graded
         return (*self.task.conditions, STOPPED) if bits else self.task.conditions
+
+    def plans(self, x: Any, samples: int) -> Any:
+        """What controllers want before the world answers, in parts of the range of each channel.
+
+        Args:
+            x: controllers in the unit cube, [n, D], an array of NumPy or torch; gradients reach it.
+            samples: S, equally far apart; the last is the end of the episode.
+
+        Returns:
+            The channels of `controller.planned`, [n, channels, S]: −1 and 1 are a channel's bounds, which a
+            plan may leave.
+
+        Raises:
+            NotImplementedError: the controller offers no plan.
+        """
+        steps = np.arange(1, samples + 1) * self.horizon // samples
+        told = self.controller.plans(x, PlanTimes(steps, self.horizon, self.control_step))
+        low, high = (
+            constant([[getattr(channel, end)] for channel in self.controller.planned], x)
+            for end in ("low", "high")
+        )
+        return 2.0 * (told - low) / (high - low) - 1.0
 
     def open(self) -> Environment:
         """Start the simulated environment; close it, or use it in a `with` block."""

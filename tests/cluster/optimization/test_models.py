@@ -1,5 +1,7 @@
 """Trained models that a user names."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -8,6 +10,7 @@ from cluster.optimization.models import shared_model, trained_model
 from svaedc.model import checkpoint
 from svaedc.model.config import ModelConfig
 from svaedc.model.svae_dc import SvaeDc
+from workers import setups
 
 
 @pytest.fixture
@@ -57,3 +60,30 @@ def test_a_model_of_a_setup_that_is_gone_serves_no_other(folder):
 def test_a_model_that_several_runs_share_is_loaded_once(folder):
     first = shared_model(folder / "model.pt", "franka-rehearsal")
     assert shared_model(folder / "model.pt", "franka-rehearsal") is first
+
+
+def plan_reader(folder, channels, setup="franka"):
+    config = ModelConfig(48, 3, 40, channels=(8,), decoder_hidden=(8,), rank=2, prior_hidden=(8,))
+    model = SvaeDc(replace(config, prior="plan", plan_channels=channels))
+    checkpoint.save(folder / "model.pt", model, {"setup": setup, "stride": 5})
+
+
+def test_a_model_that_reads_plans_has_those_of_the_robot_it_was_trained_on(tmp_path):
+    plan_reader(tmp_path, len(setups.load("franka").controller.planned))
+    x = torch.rand(3, 48)
+    found = trained_model(tmp_path, "franka-rehearsal").model
+    assert torch.equal(found.known_plan_of()(x), setups.load("franka").plans(x, 50))
+    assert found.latent_means(x)[0].shape == (3, 9)
+
+
+@pytest.mark.parametrize(
+    ("channels", "setup", "named"),
+    [
+        (5, "franka", "reads plans of 5 channels, those of franka have 13"),
+        (13, "frank", "plans of 'frank'"),
+    ],
+)
+def test_a_model_whose_plans_cannot_be_had_is_refused(tmp_path, channels, setup, named):
+    plan_reader(tmp_path, channels, setup)
+    with pytest.raises(UserError, match=named):
+        trained_model(tmp_path, setup)

@@ -115,3 +115,11 @@ def test_a_relative_cache_folder_is_the_driver_s(run_train, monkeypatch, tmp_pat
     monkeypatch.chdir(tmp_path)
     run_train(cache=Path("near"))
     assert len(list((tmp_path / "near").glob("*-stride5"))) == 1
+
+
+def test_a_training_may_read_plans(run_train):
+    path = run_train("reader", prior="plan", updates=4, epoch_updates=2)
+    model, metadata = checkpoint.load(path)
+    assert (model.config.prior, model.config.plan_channels) == ("plan", 13)
+    assert metadata["changes"]["prior"] == "plan"
+    assert json.loads((path.parent / "metrics.json").read_text())["metrics"]["gen_norm"] > 0.0

@@ -36,10 +36,38 @@ def test_the_encoder_of_the_svae_is_blind_to_badness_and_the_other_is_not(small_
         assert torch.equal(one.loc, other.loc) == is_blind
 
 
+def plans(x: torch.Tensor) -> torch.Tensor:
+    """Two channels of seven steps: one rises with x_0, the other swings with x_1."""
+    times = torch.linspace(0, 1, 7)
+    return torch.stack([x[:, :1] * times, torch.sin(6 * times * x[:, 1:2])], dim=1)
+
+
+def test_the_prior_that_reads_plans_tells_controllers_apart_by_them(small_config):
+    torch.manual_seed(0)
+    network = PRIORS["plan"](replace(small_config, prior="plan", plan_channels=2, plan_steps=7))
+    x = torch.rand(4, small_config.controller_dim).requires_grad_()
+    with pytest.raises(RuntimeError, match="set plan_of"):
+        network(x)
+    network.plan_of = plans
+    loc = network(x).loc
+    assert loc.shape == (4, small_config.latent_size)
+    network.plan_of = lambda x: -plans(x)
+    assert not torch.allclose(network(x).loc, loc)
+    loc.sum().backward()
+    assert (x.grad.abs().sum(dim=0) > 0).all()
+
+
+def test_a_prior_that_reads_plans_needs_some(small_config):
+    with pytest.raises(ValueError, match=r"offers its plan, got one of 0 channels.*choose the prior `mlp`"):
+        replace(small_config, prior="plan")
+
+
 @pytest.mark.parametrize("kind", sorted(PRIORS))
 def test_scales_of_latents_end_at_their_bounds_however_far_the_controller(small_config, kind):
     torch.manual_seed(0)
-    p = PRIORS[kind](replace(small_config, prior=kind))(1e6 * torch.randn(50, small_config.controller_dim))
+    network = PRIORS[kind](replace(small_config, prior=kind, plan_channels=2, plan_steps=7))
+    network.plan_of = plans
+    p = network(1e6 * torch.randn(50, small_config.controller_dim))
     bounds = small_config.latent_scale
     assert p.loc.shape == (50, small_config.latent_size)
     assert p.scale.min().item() == pytest.approx(bounds.floor, rel=1e-3)

@@ -6,12 +6,13 @@ import torch
 from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.presets import LATENT_SIZES, PRESETS, VARIATIONS, Sizes, preset, vary
 
-SIZES = Sizes(controller_dim=6, observation_dim=5, time_steps=60)
+SIZES = Sizes(controller_dim=6, observation_dim=5, time_steps=60, plan_channels=4)
 CHANGES = {
     "model": "svae",
     "latent": "5x6",
     "distribution": "gaussian",
     "head": "dense",
+    "prior": "plan",
     "weighting": "balanced",
     "kl_weight": 5.0,
     "learning_rate": 3e-4,
