@@ -246,7 +246,7 @@ def plan_comparison(
         candidates=str(table.resolve()) if table is not None else "",
     )
     if table is not None:
-        require_usable(table, setup, path)
+        require_usable(table, setup, path, settings.initial_trials)
     try:
         job.require(grid.methods, setup)
     except LookupError as error:

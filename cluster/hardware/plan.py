@@ -8,6 +8,7 @@ from cluster.hardware.events import canonical
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.proposals import fingerprint
 from cluster.hardware.states import Approval
+from cluster.hardware.status import RANDOM_TRIALS
 from cluster.inputs import search_working_directory
 from cluster.optimization import methods
 from cluster.optimization.candidates import require_usable
@@ -92,7 +93,8 @@ def identify(
                 "`svaedc candidates` and name their folder with --candidates"
             )
         if candidates is not None:
-            require_usable(candidates, registry.load(known.setup), model if needs_model else None)
+            encoder = model if needs_model else None
+            require_usable(candidates, registry.load(known.setup), encoder, RANDOM_TRIALS)
         return CampaignIdentity(
             robot,
             known.setup,

@@ -19,8 +19,10 @@ from svaedc.bo.features import Latents
 from svaedc.bo.simulated.outcomes import Lookup, SimulatedLatents, SimulatedOutcomes
 from workers.dataset.shards import sha256
 from workers.dataset.storage.location import arrow_name
+from workers.plug_ins import file_name
 from workers.rollout import VERSION
 from workers.setups import Setup
+from workers.setups.registry import KIND
 
 TABLE: Final = "candidates.parquet"
 _ORIGIN: Final = b"svaedc.candidates"
@@ -145,19 +147,25 @@ def read(path: Path) -> CandidateTable:
         ) from error
 
 
-def require_usable(path: Path, setup: Setup, model: Path | None) -> None:
+def require_usable(path: Path, setup: Setup, model: Path | None, initial: int) -> None:
     """Refuse candidates that a comparison or campaign of this robot cannot choose among.
 
     Args:
         path: of their table.
         setup: whose controllers are tried.
         model: checkpoint that latent paths must be of; None where no method asks for a model.
+        initial: random trials of a run, which are candidates that were drawn.
 
     Raises:
-        UserError: they cannot be read, are of other controllers or of another version of their setups, or
-            their latent paths are of another model.
+        UserError: they cannot be read, are too few, are of other controllers or of another version of their
+            setups, or their latent paths are of another model.
     """
     table = read(path)
+    if len(table.drawn) < initial:
+        raise UserError(
+            f"the candidates of {path.parent} must hold {initial} that were drawn, for the random trials of "
+            f"a run, got {len(table.drawn)}: simulate more with --count"
+        )
     if table.x.shape[1] != setup.dimensions:
         raise UserError(
             f"the candidates of {path.parent} have {table.x.shape[1]} parameters, {setup.name} has "
@@ -172,6 +180,12 @@ def require_usable(path: Path, setup: Setup, model: Path | None) -> None:
         raise UserError(
             f"the candidates of {path.parent} were simulated by version {table.origin['rollout_version']} of "
             f"the simulation, this is {VERSION}: simulate them again"
+        )
+    codes = dict(zip(table.origin["setups"], table.origin["setup_digests"], strict=True))
+    if codes.get(setup.name, setup.code) != setup.code:
+        raise UserError(
+            f"{file_name(setup.name, KIND)} has changed since the candidates of {path.parent} were "
+            "simulated: put it back as it was, or simulate them again in another folder"
         )
     if model is not None and table.origin["model"] not in ("", sha256(model)):
         raise UserError(

@@ -9,6 +9,7 @@ from workers.rollout import VERSION
 FRANKA, RNG = setups.load("franka"), np.random.default_rng(0)
 ORIGIN = {
     "setups": ["franka"],
+    "setup_digests": [""],
     "parameters": parameters_of(FRANKA),
     "rollout_version": VERSION,
     "chosen": 5,

@@ -37,6 +37,8 @@ def test_a_table_that_is_missing_or_damaged_is_told_with_the_command_that_makes_
         ({}, "daisy-27d", "have 48 parameters, daisy-27d has 27"),
         ({"rollout_version": VERSION + 1}, "franka", f"by version {VERSION + 1} of the simulation"),
         ({"model": "0" * 64}, "franka", "latent paths of .* are of another model"),
+        ({"setup_digests": ["0" * 64]}, "franka", "has changed since the candidates of"),
+        ({"chosen": 29}, "franka", "must hold 2 that were drawn.*got 1: simulate more"),
     ],
 )
 def test_candidates_of_another_robot_version_or_model_are_refused(tmp_path, changes, setup, named):
@@ -44,9 +46,9 @@ def test_candidates_of_another_robot_version_or_model_are_refused(tmp_path, chan
     model = tmp_path / "model.pt"
     model.write_bytes(b"weights")
     with pytest.raises(UserError, match=named):
-        require_usable(tmp_path / TABLE, setups.load(setup), model)
+        require_usable(tmp_path / TABLE, setups.load(setup), model, 2)
     write(tmp_path / TABLE, table())
-    require_usable(tmp_path / TABLE, FRANKA, model)
+    require_usable(tmp_path / TABLE, FRANKA, model, 2)
 
 
 def test_a_run_begins_with_drawn_candidates_and_chooses_among_all_of_them():
