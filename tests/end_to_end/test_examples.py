@@ -12,7 +12,10 @@ from workers.dataset.folder import open_dataset
 from workers.dataset.verification import verify
 
 
-@pytest.fixture(params=[pytest.param("cart_pole", marks=pytest.mark.slow), "gymnasium_hopper"])
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(params=["cart_pole", "gymnasium_hopper"])
 def folder(request, tmp_path):
     if request.param == "gymnasium_hopper":
         pytest.importorskip("mujoco")

@@ -33,6 +33,7 @@ def test_a_setup_agrees_with_itself(quadratic, capsys, tmp_path):
     assert size_of(tmp_path / "out" / "agreement.png")[0] > 600
 
 
+@pytest.mark.slow
 def test_two_engines_are_compared_with_clips_of_the_worst(tmp_path, capsys, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.setattr("cluster.agreement.compare.CLIPS", 1)  # of three, each takes twenty seconds
