@@ -11,7 +11,6 @@ from tests.end_to_end.test_own_robot import EXAMPLE, svaedc
 from workers.dataset.folder import open_dataset
 from workers.dataset.verification import verify
 
-
 pytestmark = pytest.mark.slow
 
 
