@@ -123,7 +123,8 @@ def test_pool_of_identical_controllers_is_no_division_by_zero():
 
 def test_model_is_needed_exactly_where_latents_are_used():
     assert [name for name in methods.names() if methods.needs_model(name)] == [
-        *("bbk-kl", "lkl", "screened-random", "screened-svae", "svae", "svae-dc", "svae-dc-matern"),
+        *("bbk-kl", "ensemble-svae", "ensemble-svae-dc", "lkl", "prior-svae", "prior-svae-dc"),
+        *("screened-random", "screened-svae", "svae", "svae-dc", "svae-dc-matern"),
         *("svae-dc-online", "svae-dc-sigmoid", "svae-dc-whitened", "svae-matern"),
     ]
     assert methods.needs_model("svae-dc-acqf-ei")
@@ -178,12 +179,13 @@ def test_trust_region_keeps_to_its_box_and_begins_anew_with_random_controllers()
 
 
 def test_method_without_its_model_or_pool_says_what_to_do():
-    pool = problem(2, 5, 0).pool
+    given = problem(2, 5, 0)
+    pool = given.pool
     for name in filter(methods.needs_model, methods.names()):
         with pytest.raises(
             ValueError, match=rf"'{name}': (latents|densities|adjustable layers) must be.*train one"
         ):
-            methods.build(name, Problem(2, (0.0, 1.0), pool))
+            methods.build(name, Problem(2, (0.0, 1.0), pool, simulated=given.simulated))
     with pytest.raises(ValueError, match=r"'se'.*got 0 controllers"):
         methods.build("se", Problem(2, (0.0, 1.0), pool[:0]))
 

@@ -9,6 +9,7 @@ from workers.collection.shard import collect_shard
 from workers.dataset.folder import create
 from workers.dataset.identity import identity_of
 from workers.dataset.shards import Shard
+from workers.draws import Draws
 from workers.rollout import draw
 
 LEAKS = {
