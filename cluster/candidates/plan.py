@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +13,14 @@ from cluster.datasets.plan import CollectionPlan, plan_collection
 from cluster.errors import UsageError, UserError
 from cluster.optimization.candidates import TABLE, origin_of, parameters_of
 from cluster.optimization.models import TrainedModel, trained_model
+from workers.collection.choice import Keep, chosen_controllers
 from workers.collection.twins import SAME, require_comparable
-from workers.dataset.folder import Dataset, open_dataset
+from workers.dataset.folder import open_dataset
 from workers.dataset.shards import sha256
 from workers.dataset.storage.location import Location
 from workers.draws import REPEAT
-from workers.episode import UNUSABLE
 from workers.rollout import VERSION
 from workers.setups import Setup
-
-
-class Keep(StrEnum):
-    """Which controllers of a dataset are candidates."""
-
-    BEST = "best"
-    LEAST_BAD = "least-bad"
 
 
 @dataclass(frozen=True)
@@ -212,29 +204,6 @@ def choose(place: Location, setup: Setup, keep: Keep, count: int) -> Float32[np.
                 f"the controllers of {place} ({dataset.identity.setup}) are not those of {setup.name}: "
                 "choose among a dataset of the same robot"
             )
-        return _select(dataset, keep, count)
+        return chosen_controllers(dataset, keep, count)
     except (ValueError, OSError) as error:
         raise UserError(f"cannot choose among the controllers of {place}: {error}") from error
-
-
-def _select(dataset: Dataset, keep: Keep, count: int) -> Float32[np.ndarray, "c d"]:
-    """Each controller is judged by the mean of its episodes; equal ones keep their order."""
-    x, scores = [], []
-    repeats = dataset.identity.repeats
-    draws, dimensions = dataset.draws(), len(dataset.identity.parameters)
-    for shard in dataset.disjoint():
-        outcomes = dataset.outcomes(shard)
-        usable = np.array([stop not in UNUSABLE for stop in outcomes.stop])
-        score = outcomes.f if keep is Keep.BEST else -outcomes.y
-        scores.append(np.where(usable, score, -np.inf))
-        x.append(outcomes.episode // repeats)
-    if not x:
-        raise ValueError("it holds no episodes")
-    numbers, mean = _means(np.concatenate(x), np.concatenate(scores))
-    first = numbers[np.argsort(-mean, kind="stable")[:count]]
-    return np.stack([draws.controller(dimensions, int(number) * repeats) for number in first])
-
-
-def _means(numbers: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    unique, place = np.unique(numbers, return_inverse=True)
-    return unique, np.bincount(place, scores) / np.bincount(place)

@@ -127,7 +127,8 @@ def candidates(
     --candidates` and `hardware start --candidates` choose among them. All candidates share their physics. Run
     the same command again after an interruption.
     """
-    from cluster.candidates.plan import Keep, choose, plan_candidates
+    from cluster.candidates.plan import choose, plan_candidates
+    from workers.collection.choice import Keep
 
     settings = settings_of(config, overrides)
     names = [name.strip() for name in also.split(",") if name.strip()]

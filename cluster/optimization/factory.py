@@ -79,10 +79,10 @@ class Optimization:
         )
         if self.model is None or not methods.needs_model(self.method):
             return problem
-        learnt = Latents.of(torch.from_numpy(pool), self.model.latent_means)
+        simulated = candidates.latents(pool) if candidates else None
         return replace(
             problem,
-            latents=(candidates.latents(pool) if candidates else None) or learnt,
+            latents=simulated or Latents.of(torch.from_numpy(pool), self.model.latent_means),
             densities=Densities.of(self.model),
             adjustable=Adjustable(self.model),
         )

@@ -8,13 +8,13 @@ from typing import Any
 
 from cluster.errors import UserError
 from cluster.files import read_json, write_json
-from cluster.optimization.models import let_read_plans
+from cluster.optimization.models import load_model
 from cluster.progress import say
 from cluster.rendering.model_frames import write_remarkable
 from cluster.tracking import Run, log_model
 from cluster.training import figures
 from cluster.training.worker import MODEL, TrainingJob, episodes
-from svaedc.model import checkpoint, diagnostics
+from svaedc.model import diagnostics
 from svaedc.model.svae_dc import SvaeDc
 from workers.dataset.cache import TrainingCache
 from workers.dataset.folder import Dataset
@@ -43,8 +43,7 @@ def record(
         OSError: a file cannot be written.
         UserError: the MLflow store cannot be used.
     """
-    model, metadata = checkpoint.load(job.model / MODEL)
-    let_read_plans(model, job.origin["setup"])
+    _, model, metadata = load_model(job.model / MODEL)
     _, held_out = episodes(cache)
     metrics = diagnostics.evaluate(model, held_out)
     collapsed = diagnostics.collapse(metrics) or ""

@@ -15,7 +15,7 @@ from svaedc.bo.distribution_features import Densities, Density
 from svaedc.bo.features import Embedding, Latents
 from svaedc.bo.history import History
 from svaedc.bo.online import Adjustable
-from svaedc.bo.simulated.outcomes import SimulatedOutcomes
+from svaedc.bo.simulated.outcomes import SimulatedLatents, SimulatedOutcomes
 
 Part = TypeVar("Part")
 
@@ -86,6 +86,11 @@ class Problem:
                 "name their folder with --candidates"
             )
         return self.simulated
+
+    @property
+    def has_simulated_latents(self) -> bool:
+        """Whether the latents are those of simulated candidates, and of no other controllers."""
+        return self.latents is not None and isinstance(self.latents.at, SimulatedLatents)
 
     def known_adjustable(self) -> Adjustable:
         """The model; without one, a `ValueError`."""

@@ -19,6 +19,7 @@ from svaedc.bo.acquisition import (
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
 from svaedc.bo.method_names import MethodName, names, needs_candidates, needs_model
 from svaedc.bo.simulated import prior
+from svaedc.bo.simulated.outcomes import spread
 from svaedc.bo.strategies import (
     BayesianOptimization,
     InOrder,
@@ -56,8 +57,8 @@ LATENT_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
 """These methods need a trained model."""
 
 SIMULATED_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
-    f"{name}-{features}": partial(surrogate, covariance, kernels.se)
-    for name, covariance in (("prior", prior.Trusted), ("ensemble", prior.Ensemble))
+    f"{name}-{features}": partial(surrogate, regressors, kernels.se)
+    for name, regressors in (("prior", prior.trust), ("ensemble", prior.ensemble))
     for features, surrogate in (
         ("se", prior.on_controllers),
         ("svae", prior.on_paths),
@@ -73,9 +74,7 @@ _UNLEARNT: Final[dict[str, Callable[[Problem], Method]]] = {
     "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),
     "simulated-random": lambda problem: _in_simulation(problem, PoolSearch),
     "simulated-best": lambda problem: _in_order(problem, lambda f, _: f.mean(dim=1)),
-    "simulated-cautious": lambda problem: _in_order(
-        problem, lambda f, _: f.mean(dim=1) - f.std(dim=1, correction=0)
-    ),
+    "simulated-cautious": lambda problem: _in_order(problem, lambda f, _: f.mean(dim=1) - spread(f)),
     "least-bad": lambda problem: _in_order(problem, lambda _, y: -y.mean(dim=1)),
 }
 """Nothing that a trial shows changes what these suggest next."""
@@ -148,6 +147,11 @@ def _in_simulation(problem: Problem, method: Callable[[Candidates], Method]) -> 
 def _optimization(name: MethodName, problem: Problem) -> Method:
     if name.search == "pool" and not len(problem.pool):
         raise ValueError("a method that searches a pool needs one, got 0 controllers: draw at least one")
+    is_looked_up = name.base in LATENT_SURROGATES and problem.has_simulated_latents
+    if name.search == "acqf" and (is_looked_up or name.base in SIMULATED_SURROGATES):
+        raise ValueError(
+            "between candidates nothing was simulated, so gradients lead nowhere: leave `-acqf` out"
+        )
     kind = TrustRegionOptimization if name.base == "turbo" else BayesianOptimization
     surrogate = (SURROGATES | LATENT_SURROGATES | SIMULATED_SURROGATES)[name.base](problem)
     return kind(surrogate, _ACQUISITIONS[name.acquisition], _SEARCHES[name.search])

@@ -9,7 +9,14 @@ from jaxtyping import Float32
 
 from workers.controllers.arrays import constant, namespace
 from workers.controllers.controller import Command, Controller, PlanTimes
-from workers.controllers.reference import ends, euler_angles, line_through, motion_through, reference
+from workers.controllers.reference import (
+    ends,
+    euler_angles,
+    leg_at,
+    line_through,
+    motion_through,
+    reference,
+)
 from workers.environments.environment import Channel
 from workers.environments.tabletop import ArmScene
 from workers.plans import HandPlan, PlannedCommand
@@ -116,8 +123,7 @@ class EndEffectorWaypoints(Controller):
         corners = xp.concatenate([home, points[:, :, :6]], 1)
         position, velocity = motion_through(corners[:, :, :3], times)
         angles = line_through(corners[:, :, 3:], times)
-        leg = np.minimum((times * self._waypoints - 1e-9).astype(int), self._waypoints - 1)
-        gains = xp.swapaxes(points[:, leg, 6:], 1, 2)
+        gains = xp.swapaxes(points[:, leg_at(times, self._waypoints), 6:], 1, 2)
         far = [
             ((position[:, 0] - px) ** 2 + (position[:, 1] - py) ** 2 + _NEAR**2) ** 0.5
             for px, py in self._objects

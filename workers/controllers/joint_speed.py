@@ -9,7 +9,7 @@ from jaxtyping import Float, Float32
 
 from workers.controllers.arrays import constant, namespace
 from workers.controllers.controller import Command, Controller, PlanTimes
-from workers.controllers.reference import minimum_jerk
+from workers.controllers.reference import minimum_jerk, rise
 from workers.environments.environment import Channel
 from workers.environments.tabletop import ArmScene
 from workers.plans import JointPlan, PlannedCommand
@@ -81,10 +81,9 @@ class JointSpeedWaypoints(Controller):
         begins = xp.cumsum(durations, 1) - durations
         s = (constant(moments.parts, x)[None, :, None] - begins[:, None]) / durations[:, None]
         inside, after = xp.clip(s, 0.0, 1.0), xp.clip(s - 1.0, 0.0, None)
-        rise = 10 * inside**3 - 15 * inside**4 + 6 * inside**5
         area = (2.5 * inside**4 - 3 * inside**5 + inside**6 + after) * durations[:, None]
         seconds = moments.horizon * moments.control_step
-        both = [rise @ changes, seconds * (area @ changes)]
+        both = [rise(inside) @ changes, seconds * (area @ changes)]
         return xp.concatenate([xp.swapaxes(part, 1, 2) for part in both], 1)
 
     def start(self, x: Float32[np.ndarray, " d"], environment: ArmScene, horizon: int) -> Command:

@@ -49,6 +49,16 @@ def reference(
     )
 
 
+def rise(s: Any) -> Any:
+    """From 0 to 1 without a jerk while s does, 10 s³ − 15 s⁴ + 6 s⁵; an array of NumPy or torch."""
+    return 10 * s**3 - 15 * s**4 + 6 * s**5
+
+
+def rise_rate(s: Any) -> Any:
+    """The derivative of `rise`, 30 s² − 60 s³ + 30 s⁴."""
+    return 30 * s**2 - 60 * s**3 + 30 * s**4
+
+
 def minimum_jerk(
     s: Float[np.ndarray, "time 1"],
     a: Float[np.ndarray, "#time d"],
@@ -68,8 +78,8 @@ def minimum_jerk(
     Returns:
         Position, velocity and acceleration, [T, d] each, in the units of a, b and duration.
     """
-    position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    velocity = (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) / duration
+    position = a + (b - a) * rise(s)
+    velocity = (b - a) * rise_rate(s) / duration
     acceleration = (b - a) * (60 * s - 180 * s**2 + 120 * s**3) / duration**2
     return position, velocity, acceleration
 
@@ -85,11 +95,8 @@ def motion_through(corners: Any, times: np.ndarray) -> tuple[Any, Any]:
         Position and velocity, [n, d, S] each, in the units of `corners`, and of those per episode.
     """
     legs = int(corners.shape[1]) - 1
-    leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
-    s = constant(times * legs - leg, corners)
-    a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
-    position = a + (b - a) * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    return position, (b - a) * (30 * s**2 - 60 * s**3 + 30 * s**4) * legs
+    s, a, b = _legs_of(corners, times)
+    return a + (b - a) * rise(s), (b - a) * rise_rate(s) * legs
 
 
 def line_through(corners: Any, times: np.ndarray) -> Any:
@@ -102,11 +109,29 @@ def line_through(corners: Any, times: np.ndarray) -> Any:
     Returns:
         Values, [n, d, S], in the units of `corners`.
     """
-    legs = int(corners.shape[1]) - 1
-    leg = np.minimum((times * legs - 1e-9).astype(int), legs - 1)
-    s = constant(times * legs - leg, corners)
-    a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
+    s, a, b = _legs_of(corners, times)
     return a + s * (b - a)
+
+
+def leg_at(times: np.ndarray, legs: int) -> np.ndarray:
+    """The leg, from 0, that each moment is in, where all take equal shares of the episode.
+
+    Args:
+        times: in parts of the episode, in (0, 1], [S].
+        legs: how many there are.
+
+    Returns:
+        Numbers of legs, [S]; the end of one belongs to it.
+    """
+    return np.minimum((times * legs - 1e-9).astype(int), legs - 1)
+
+
+def _legs_of(corners: Any, times: np.ndarray) -> tuple[Any, Any, Any]:
+    """What part of its leg each moment is at, [S], and where that leg begins and ends, [n, d, S]."""
+    legs = int(corners.shape[1]) - 1
+    leg = leg_at(times, legs)
+    a, b = (namespace(corners).swapaxes(corners[:, leg + end], 1, 2) for end in (0, 1))
+    return constant(times * legs - leg, corners), a, b
 
 
 def quaternions(euler: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, "time 4"]:

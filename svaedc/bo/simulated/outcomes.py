@@ -11,6 +11,11 @@ from jaxtyping import Float, Float32, Int
 from torch import Tensor
 
 
+def spread(values: Float[Tensor, "*n e"]) -> Float[Tensor, "*n"]:
+    """Standard deviation over the worlds; 0 for a single one."""
+    return values.std(dim=-1, correction=0)
+
+
 class Lookup:
     """The rows of controllers that were simulated; there is no saying anything of others.
 

@@ -30,6 +30,7 @@ from svaedc.bo.candidates import Candidates, Problem, as_they_are, by_latents
 from svaedc.bo.features import Embedding, svae, svae_dc
 from svaedc.bo.gp import fit, scale_objectives
 from svaedc.bo.kernels import Embedded
+from svaedc.bo.simulated.outcomes import spread
 from svaedc.bo.surrogates import KernelOf, Surrogate
 
 TRUST: Final = 0.5
@@ -69,20 +70,22 @@ class SimulatedMean(Mean):
         return self._worlds(x).f.mean(dim=-1)
 
 
+Regressors = Callable[[Worlds], Tensor]
+"""It gives what random weights belong to, each times the standard deviation of its weight, [..., n, r]."""
+
+
 class LinearKernel(Kernel):
     """The covariance of a linear function of what simulation showed, with random weights, and of b.
 
     Args:
         worlds: Takes what simulation showed out of rows of features.
+        regressors: What the weights belong to.
     """
 
-    def __init__(self, worlds: WorldsOf) -> None:
+    def __init__(self, worlds: WorldsOf, regressors: Regressors) -> None:
         super().__init__()
         self._worlds = worlds
-
-    def regressors(self, worlds: Worlds) -> Tensor:
-        """What the weights belong to, each times the standard deviation of its weight, [..., n, r]."""
-        raise NotImplementedError
+        self._regressors = regressors
 
     def forward(self, x1: Tensor, x2: Tensor, diag: bool = False, **_: Any) -> Tensor:  # noqa: FBT001, FBT002
         """Compute the kernel matrix, as GPyTorch calls it.
@@ -96,31 +99,21 @@ class LinearKernel(Kernel):
         Returns:
             The matrix, [..., n, m], or its diagonal, [..., n].
         """
-        one, other = (self.regressors(self._worlds(x)) for x in (x1, x2))
+        one, other = (self._regressors(self._worlds(x)) for x in (x1, x2))
         return ((one * other).sum(dim=-1) if diag else one @ other.mT) + SHIFT**2
 
 
-class Trusted(LinearKernel):
-    r"""The covariance of a \bar f + b + c s + d \bar y.
-
-    It is TRUST^2 (\bar f \bar f' + s s' + \bar y \bar y') + SHIFT^2.
-    """
-
-    def regressors(self, worlds: Worlds) -> Tensor:
-        """Mean objective, its spread, mean badness."""
-        mean, spread = worlds.f.mean(dim=-1), worlds.f.std(dim=-1, correction=0)
-        return TRUST * torch.stack([mean, spread, worlds.y.mean(dim=-1)], dim=-1)
+def trust(worlds: Worlds) -> Tensor:
+    r"""Regressors of a \bar f + b + c s + d \bar y: mean objective, its spread, mean badness."""
+    return TRUST * torch.stack([worlds.f.mean(dim=-1), spread(worlds.f), worlds.y.mean(dim=-1)], dim=-1)
 
 
-class Ensemble(LinearKernel):
-    r"""The covariance of sum_j w_j (f_j - \bar f) + b: that of the worlds, and SHIFT^2."""
-
-    def regressors(self, worlds: Worlds) -> Tensor:
-        """How each world differs from their mean."""
-        return (worlds.f - worlds.f.mean(dim=-1, keepdim=True)) / worlds.f.shape[-1] ** 0.5
+def ensemble(worlds: Worlds) -> Tensor:
+    r"""Regressors of sum_j w_j (f_j - \bar f) + b: how each world differs from their mean."""
+    return (worlds.f - worlds.f.mean(dim=-1, keepdim=True)) / worlds.f.shape[-1] ** 0.5
 
 
-def on_controllers(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
+def on_controllers(prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     """The simulated objective as prior mean, and k_0 on x.
 
     Args:
@@ -134,7 +127,7 @@ def on_controllers(prior: type[LinearKernel], kernel: KernelOf, problem: Problem
     return _surrogate(as_they_are(problem), prior, kernel, problem)
 
 
-def on_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
+def on_paths(prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""The simulated objective as prior mean, and k_0 on \bar\tau.
 
     Args:
@@ -148,7 +141,7 @@ def on_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> S
     return _on_latents(svae, prior, kernel, problem)
 
 
-def on_compressed_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Problem) -> Surrogate:
+def on_compressed_paths(prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     r"""The simulated objective as prior mean, and k_0 on (1 - \bar y) \bar\tau.
 
     Args:
@@ -163,16 +156,12 @@ def on_compressed_paths(prior: type[LinearKernel], kernel: KernelOf, problem: Pr
     return _on_latents(svae_dc, prior, kernel, problem)
 
 
-def _on_latents(
-    embedding: Embedding, prior: type[LinearKernel], kernel: KernelOf, problem: Problem
-) -> Surrogate:
+def _on_latents(embedding: Embedding, prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     problem.known_outcomes()
     return _surrogate(by_latents(problem, embedding), prior, kernel, problem)
 
 
-def _surrogate(
-    compared: Candidates, prior: type[LinearKernel], kernel: KernelOf, problem: Problem
-) -> Surrogate:
+def _surrogate(compared: Candidates, prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     dimensions = compared.phi.shape[1]
 
     def features(rows: Tensor) -> Tensor:
@@ -183,7 +172,7 @@ def _surrogate(
 
     process = partial(
         fit,
-        lambda: Embedded(kernel(dimensions), features) + prior(worlds),
+        lambda: Embedded(kernel(dimensions), features) + LinearKernel(worlds, prior),
         mean=lambda: SimulatedMean(worlds),
     )
     return Surrogate(_with_simulations(compared, problem), process, problem.objective_limits)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from cluster.candidates.plan import Keep, choose
+from cluster.candidates.plan import choose
 from cluster.errors import UsageError, UserError
 from tests.cluster.candidates.conftest import FRANKA
 from workers import setups
+from workers.collection.choice import Keep
 from workers.dataset.folder import open_dataset
 
 

@@ -9,7 +9,7 @@ import torch
 from svaedc.bo import kernels, methods
 from svaedc.bo.history import History
 from svaedc.bo.simulated import prior
-from svaedc.bo.simulated.outcomes import Lookup, SimulatedOutcomes
+from svaedc.bo.simulated.outcomes import Lookup, SimulatedLatents, SimulatedOutcomes
 from tests.svaedc.bo.fake_latents import problem
 
 COUNT, WORLDS = 60, 4
@@ -56,7 +56,7 @@ def test_candidates_are_tried_in_the_order_of_their_score_whatever_the_trials_sh
     )
 
 
-@pytest.mark.parametrize("kind", [prior.Trusted, prior.Ensemble])
+@pytest.mark.parametrize("kind", [prior.trust, prior.ensemble])
 def test_far_from_all_trials_the_process_expects_what_simulation_showed(kind):
     f = random_worlds()
     surrogate = prior.on_controllers(kind, kernels.se, simulated_problem(f))
@@ -73,13 +73,15 @@ def test_the_covariances_are_those_of_the_formulas():
     def worlds(rows):
         return prior.Worlds(*rows.chunk(2, dim=-1))
 
-    trusted, ensemble = (kind(worlds)(rows).to_dense() for kind in (prior.Trusted, prior.Ensemble))
+    trusted, ensemble = (
+        prior.LinearKernel(worlds, kind)(rows).to_dense() for kind in (prior.trust, prior.ensemble)
+    )
     mean, spread, bad = f.mean(dim=1), f.std(dim=1, correction=0), y.mean(dim=1)
     products = sum(torch.outer(each, each) for each in (mean, spread, bad))
     assert torch.allclose(trusted, prior.TRUST**2 * products + prior.SHIFT**2)
     assert torch.allclose(ensemble, torch.cov(f, correction=0) + prior.SHIFT**2)
-    for kind, matrix in ((prior.Trusted, trusted), (prior.Ensemble, ensemble)):
-        assert torch.allclose(kind(worlds)(rows, diag=True), matrix.diagonal())
+    for kind, matrix in ((prior.trust, trusted), (prior.ensemble, ensemble)):
+        assert torch.allclose(prior.LinearKernel(worlds, kind)(rows, diag=True), matrix.diagonal())
 
 
 def test_a_robot_like_one_of_the_worlds_is_recognised_by_its_trials():
@@ -112,7 +114,13 @@ def test_a_problem_without_simulated_candidates_is_refused_naming_the_command(na
         methods.build(name, replace(problem(3, 10, 0), simulated=None))
 
 
+def given_latents(given):
+    return given.latents.tau, given.latents.y, Lookup(given.pool)
+
+
 def test_a_search_between_the_candidates_is_refused():
     given = simulated_problem(random_worlds())
-    with pytest.raises(ValueError, match="not simulated"):
-        run("prior-se-acqf", given, lambda _: 0.0)
+    given = replace(given, latents=replace(given.latents, at=SimulatedLatents(*given_latents(given))))
+    for name in ("prior-se-acqf", "svae-dc-acqf", "ensemble-svae-acqf"):
+        with pytest.raises(ValueError, match=r"nothing was simulated.*leave `-acqf` out"):
+            methods.build(name, given)
