@@ -133,7 +133,7 @@ def main() -> None:
                     ComparisonFolder(Path(name)),
                     arguments.setup,
                     "paper",
-                    "",
+                    (),
                     pool_size=5000,
                     initial=2,
                     trials=20,

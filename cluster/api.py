@@ -4,7 +4,7 @@ Each function does what the command of its name does, with the same settings and
 model or comparison may be begun by one and continued by the other.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,8 @@ METHODS = ("random", "screened-random", "se", "svae", "svae-dc")
 """What `compare` compares unless it is told otherwise."""
 AS_CONFIGURED: Mapping[str, Any] = {}
 """No setting is changed."""
+Models = Path | str | Sequence[Path | str]
+"""These are folders of trained models: one, several, or, as (), none."""
 
 
 def setup_names() -> tuple[str, ...]:
@@ -168,7 +170,7 @@ def compare(
     out: Path | str,
     *,
     methods: tuple[str, ...] = METHODS,
-    model: Path | str | None = None,
+    model: Models = (),
     runs: int = 50,
     trials: int = 20,
     gap: str = "paper",
@@ -183,7 +185,7 @@ def compare(
         setup: whose controllers, or its name. Processes that run trials import it by its name.
         out: folder of the results.
         methods: names; see `method_names`.
-        model: folder of a model of this setup; None for methods that need none.
+        model: folder of a model of this setup, where methods need one; with several, runs take turns.
         runs: seeds of each method.
         trials: suggested in each run, after the random ones.
         gap: hidden physics: `paper`, `training`, `wide`, or ranges written out.
@@ -204,7 +206,7 @@ def compare(
         grid=Grid(methods, seed, runs),
         trials=trials,
         gap=gap,
-        model=None if model is None else Path(model).absolute(),
+        models=_folders(model),
         folder=Path(out).absolute(),
         settings=known.compare,
         candidates=None if candidates is None else Path(candidates).absolute(),
@@ -217,7 +219,7 @@ def simulate_candidates(
     setup: Setup | str,
     out: Path | str,
     *,
-    model: Path | str | None = None,
+    model: Models = (),
     count: int = 2000,
     episodes: int = 6,
     gap: str = "wide",
@@ -230,7 +232,7 @@ def simulate_candidates(
     Args:
         setup: whose controllers, or its name. Rollout processes import it by its name.
         out: folder of the candidates.
-        model: folder of a model of this setup, which encodes the episodes; None for none.
+        model: folder of a model of this setup, which encodes the episodes; there may be several, or none.
         count: how many candidates.
         episodes: of each, under different physics.
         gap: level that the physics are drawn from, or its ranges.
@@ -251,7 +253,7 @@ def simulate_candidates(
         episodes=episodes,
         gap=gap,
         seed=seed,
-        model=None if model is None else Path(model).absolute(),
+        models=_folders(model),
         chosen=None,
         folder=Path(out).absolute(),
         settings=known.collect,
@@ -286,6 +288,11 @@ def simulated_robot(setup: Setup | str, gap: str = "paper", seed: int = 0) -> It
 
 def _setup(setup: Setup | str) -> Setup:
     return setup_of(setup) if isinstance(setup, str) else setup
+
+
+def _folders(models: Models) -> list[Path]:
+    given = [models] if isinstance(models, str | Path) else models
+    return [Path(model).absolute() for model in given]
 
 
 def _settings(changes: Mapping[str, Any]) -> Settings:

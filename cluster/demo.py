@@ -9,7 +9,7 @@ from cluster.comparison.compare import Comparison
 from cluster.config import Settings
 from cluster.progress import say
 from cluster.reproduction.plan import Reproduction, Scale
-from cluster.reproduction.recipe import NINE, Panel, Recipe
+from cluster.reproduction.recipe import NINE, Panel, Recipe, Training
 from cluster.reproduction.run import preflight, run_steps
 from cluster.runtime.session import Session
 from cluster.tracking import Tracker
@@ -102,8 +102,8 @@ def plan_demo(folder: Path, size: DemoSize = FULL) -> Reproduction:
         runs=size.runs,
         dataset=folder / "dataset",
         collects=True,
-        models={NINE: folder / "model"},
-        trains=(NINE,),
+        models={Training(NINE): folder / "model"},
+        trains=(Training(NINE),),
         results=folder,
     )
 

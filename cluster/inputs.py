@@ -36,6 +36,11 @@ def durable(path: Path | None) -> Path | None:
         return expand_home(path).absolute()
 
 
+def durable_each(paths: list[Path] | None) -> list[Path]:
+    """The same of each of several paths."""
+    return [path for path in map(durable, paths or ()) if path is not None]
+
+
 def dataset_location(text: str) -> "Location":
     """Where a dataset lies: a folder, or `s3://bucket/prefix`.
 

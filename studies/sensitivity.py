@@ -126,7 +126,7 @@ def gains(cell: Cell, setup_name: str, model: Path, out: Path) -> dict[str, floa
         for method, of in (("random", random), ("svae-dc", cell)):
             folder = ComparisonFolder(out / "runs" / _digest(tuple(asdict(replace(of, runs=0)).values())))
             (folder.path / "runs").mkdir(parents=True, exist_ok=True)
-            job = ComparisonJob(folder, setup.name, cell.gap, str(model), cell.pool, INITIAL, TRIALS)
+            job = ComparisonJob(folder, setup.name, cell.gap, (str(model),), cell.pool, INITIAL, TRIALS)
             for seed in range(FIRST_TUNING, FIRST_TUNING + cell.runs):
                 key = RunKey(method, seed)
                 for _ in job.run(key, setup, environment):

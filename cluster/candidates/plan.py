@@ -32,7 +32,7 @@ class CandidatesPlan:
         setups: they are simulated in; all take the same controllers.
         collections: of their episodes, one of each setup.
         episodes: of each candidate in each setup.
-        model: encodes the episodes; None for none.
+        models: encode the episodes.
         origin: what the table will say of itself, but for its fingerprints.
     """
 
@@ -40,7 +40,7 @@ class CandidatesPlan:
     setups: tuple[Setup, ...]
     collections: tuple[CollectionPlan, ...]
     episodes: int
-    model: TrainedModel | None
+    models: tuple[TrainedModel, ...]
     origin: Mapping[str, Any]
 
     @property
@@ -66,7 +66,7 @@ def plan_candidates(
     episodes: int,
     gap: str,
     seed: int,
-    model: Path | None,
+    models: Sequence[Path],
     chosen: Float32[np.ndarray, "c d"] | None,
     folder: Path,
     settings: CollectSettings,
@@ -82,7 +82,7 @@ def plan_candidates(
         episodes: of each in each setup.
         gap: level that the physics are drawn from, or its ranges.
         seed: of candidates and physics.
-        model: folder of one that encodes the episodes; None for none.
+        models: folders of those that encode the episodes.
         chosen: candidates that come first; None where all are drawn.
         folder: of everything; each setup's episodes are a dataset in it, named after the setup.
         settings: of the collection.
@@ -93,14 +93,14 @@ def plan_candidates(
     Raises:
         UsageError: the setups differ in their controllers, there is no such gap, or fewer candidates are
             asked for than are chosen.
-        UserError: the folder holds other candidates, or the model is of another robot.
+        UserError: the folder holds other candidates, or a model is of another robot.
     """
     _require_one_robot(setups)
     if chosen is not None and len(chosen) > count:
         raise UsageError(
             f"--count must be at least the {len(chosen)} controllers that are chosen, got {count}"
         )
-    found = _model(model, setups)
+    found = tuple(_model(model, setups) for model in models)
     plans = tuple(
         plan_collection(
             setup=setup,
@@ -120,7 +120,7 @@ def plan_candidates(
         setups=tuple(setups),
         collections=plans,
         episodes=episodes,
-        model=found,
+        models=found,
         origin=_origin(plans, setups, count, episodes, found),
     )
 
@@ -130,7 +130,7 @@ def _origin(
     setups: Sequence[Setup],
     count: int,
     episodes: int,
-    model: TrainedModel | None,
+    models: Sequence[TrainedModel],
 ) -> dict[str, Any]:
     identity = plans[0].dataset.identity
     draws = plans[0].dataset.draws()
@@ -149,8 +149,7 @@ def _origin(
             for setup in setups
             for number in range(episodes)
         ],
-        "model": sha256(model.path) if model else "",
-        "path": model.model.config.tau_size if model else 0,
+        "models": {sha256(each.path): each.model.config.tau_size for each in models},
     }
 
 
@@ -168,9 +167,7 @@ def _require_one_robot(setups: Sequence[Setup]) -> None:
             )
 
 
-def _model(model: Path | None, setups: Sequence[Setup]) -> TrainedModel | None:
-    if model is None:
-        return None
+def _model(model: Path, setups: Sequence[Setup]) -> TrainedModel:
     for setup in setups[1:]:
         trained_model(model, setup.name)
     return trained_model(model, setups[0].name)

@@ -1,6 +1,6 @@
 """`svaedc candidates`: simulate what is missing, encode it, and write the table."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from cluster.config import CollectSettings
 from cluster.datasets.collect import collect
 from cluster.files import writing
 from cluster.optimization.candidates import CandidateTable, read, write
+from cluster.optimization.models import TrainedModel
 from cluster.progress import say
 from cluster.runtime.session import Session
 from cluster.tracking import Tracker
@@ -58,13 +59,18 @@ def summarise(plan: CandidatesPlan) -> CandidateTable:
     parts = [_outcomes(plan, collection.dataset) for collection in plan.collections]
     table = CandidateTable(
         x=parts[0]["x"],
-        **{name: np.concatenate([part[name] for part in parts], axis=1) for name in ("f", "y", "bad", "tau")},
+        **{name: _all_worlds(parts, name) for name in ("f", "y", "bad")},
+        tau={model: _all_worlds(parts, model) for model in plan.origin["models"]},
         origin=plan.full_origin(),
     )
     with writing(plan.folder):
         write(plan.table, table)
     say_table(plan, table)
     return table
+
+
+def _all_worlds(parts: Sequence[Mapping[str, np.ndarray]], name: str) -> np.ndarray:
+    return np.concatenate([part[name] for part in parts], axis=1)
 
 
 def say_whole(plan: CandidatesPlan) -> None:
@@ -90,7 +96,7 @@ def say_table(plan: CandidatesPlan, table: CandidateTable) -> None:
 
 
 def _outcomes(plan: CandidatesPlan, dataset: Dataset) -> dict[str, np.ndarray]:
-    """What the episodes of one setup showed, [candidate, world, ...]."""
+    """What the episodes of one setup showed, [candidate, world, ...]; latent paths by their models."""
     parts = list(_parts(plan, dataset))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     count = len(whole["f"]) // plan.episodes
@@ -109,13 +115,14 @@ def _parts(plan: CandidatesPlan, dataset: Dataset) -> Iterator[dict[str, np.ndar
             "f": columns.f[kept].astype(np.float64),
             "y": columns.y[kept].astype(np.float64),
             "bad": conditions[kept].astype(np.float64),
-            "tau": _latents(plan, columns, dataset.identity.horizon)[kept],
+            **{
+                name: _latents(model, columns, dataset.identity.horizon)[kept]
+                for name, model in zip(plan.origin["models"], plan.models, strict=True)
+            },
         }
 
 
-def _latents(plan: CandidatesPlan, columns: Columns, horizon: int) -> np.ndarray:
-    if plan.model is None:
-        return np.empty((len(columns.f), 0))
-    steps = stride_steps(horizon, stride_of(plan.model))
+def _latents(model: TrainedModel, columns: Columns, horizon: int) -> np.ndarray:
+    steps = stride_steps(horizon, stride_of(model))
     bad = degrees(columns.bad[:, steps]).astype(np.float32)
-    return latent_paths(plan.model.model, columns.xi[:, :, steps], bad, columns.y)
+    return latent_paths(model.model, columns.xi[:, :, steps], bad, columns.y)

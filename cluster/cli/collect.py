@@ -12,12 +12,11 @@ from cluster.cli.options import (
     Overrides,
     Seed,
     SetupName,
-    TrainedModel,
     services,
     settings_of,
 )
 from cluster.errors import UsageError
-from cluster.inputs import durable, durable_dataset, require_working_setup, setup_of
+from cluster.inputs import durable, durable_dataset, durable_each, require_working_setup, setup_of
 
 Also = Annotated[
     str,
@@ -26,6 +25,14 @@ Also = Annotated[
         metavar="SETUPS",
         help="Further setups with the same controllers, separated by commas, such as the robot in another "
         "engine.",
+    ),
+]
+Encoders = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--model",
+        help="Folder of a trained model, which encodes every episode; may be repeated.",
+        callback=durable_each,
     ),
 ]
 Among = Annotated[
@@ -99,7 +106,7 @@ def collect(
 def candidates(
     setup: SetupName,
     out: Annotated[Path, typer.Option("--out", help="Folder of the candidates.", callback=durable)],
-    model: TrainedModel = None,
+    model: Encoders = None,
     count: Annotated[int, typer.Option("--count", min=2, help="How many candidates.")] = 2000,
     episodes: Annotated[
         int,
@@ -142,7 +149,7 @@ def candidates(
         episodes=episodes,
         gap=gap,
         seed=seed,
-        model=model,
+        models=model or [],
         chosen=chosen,
         folder=out,
         settings=settings.collect,

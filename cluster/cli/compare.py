@@ -13,7 +13,7 @@ from cluster.cli.options import (
     Overrides,
     SetupName,
     SimulatedCandidates,
-    TrainedModel,
+    TrainedModels,
     services,
     settings_of,
 )
@@ -54,7 +54,7 @@ def compare(
     gap: Annotated[
         str, typer.Option("--gap", help="Hidden physics: paper, training, wide, or NAME=LOW:HIGH,NAME=VALUE.")
     ] = "paper",
-    model: TrainedModel = None,
+    model: TrainedModels = None,
     candidates: SimulatedCandidates = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first run; run i has seed + i.")] = 0,
     config: Config = None,
@@ -82,7 +82,7 @@ def compare(
             grid=Grid(names, seed, runs),
             trials=trials,
             gap=gap,
-            model=model,
+            models=model or [],
             candidates=candidates,
             folder=out,
             settings=settings.compare,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cluster.inputs import durable, durable_dataset
+from cluster.inputs import durable, durable_dataset, durable_each
 from workers.setups.names import SETUPS
 
 if TYPE_CHECKING:
@@ -54,6 +54,14 @@ DatasetFolder = Annotated[
 ModelFolder = Annotated[Path, typer.Option("--model", help="Folder of the model.", callback=durable)]
 TrainedModel = Annotated[
     Path | None, typer.Option("--model", help="Folder of a trained model.", callback=durable)
+]
+TrainedModels = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--model",
+        help="Folder of a trained model; may be repeated, and then runs take turns with the models.",
+        callback=durable_each,
+    ),
 ]
 SimulatedCandidates = Annotated[
     Path | None,

@@ -11,7 +11,10 @@ from cluster.home import expand_home
 from cluster.inputs import durable, durable_dataset, usage_errors
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cluster.config import Settings
+    from cluster.reproduction.plan import Reproduction
     from workers.dataset.storage.location import Location
 
 _SCALE_HELP = (
@@ -19,7 +22,7 @@ _SCALE_HELP = (
 )
 
 
-Figure = Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13; figure-5-mujoco, 8, 9.")]
+Figure = Annotated[str, typer.Argument(help="figure-4, 5, 7, 8, 9 or 13; figure-5-mujoco, 8, 9; transfer.")]
 Folder = Annotated[
     Path, typer.Option("--folder", help="Of data, models and results; shared by figures.", callback=durable)
 ]
@@ -66,6 +69,9 @@ def reproduce(
     with the model of figures 5, 8 and 9 (its left panel): what carries over to a robot that is not the
     simulation?
 
+    transfer is the study of ten trials: three robots (transfer-franka, transfer-yumi, transfer-daisy), each
+    hidden in three ways, with learnt features and with candidates that were simulated, and two trainings.
+
     Both Yumi figures from one dataset and model, in the same folder: `svaedc reproduce figure-8`, then
     `svaedc reproduce figure-7 --runs 50`
     """
@@ -77,35 +83,46 @@ def reproduce(
     settings = settings_of(config, overrides)
     _require_consistent(settings, dataset, episodes)
     with usage_errors():
-        recipe, size = paper_figures.recipe(figure), scales.scale(scale)
+        recipes, size = paper_figures.recipes(figure), scales.scale(scale)
         models = tuple(expand_home(path).absolute() for path in model or ())
-    reproduction = resolve(
-        recipe,
-        size,
-        folder,
-        episodes=episodes or size.episodes.get(recipe.data, 0),
-        runs=runs or recipe.runs,
-        dataset=dataset,
-        models=models,
-    )
+    if len(recipes) > 1 and (models or dataset is not None):
+        raise UsageError(
+            f"{figure} is of several robots, and --dataset and --model of one: name one of "
+            f"{', '.join(recipe.figure for recipe in recipes)}"
+        )
+    reproductions = [
+        resolve(
+            recipe,
+            size,
+            folder,
+            episodes=episodes or size.episodes.get(recipe.data, 0),
+            runs=runs or recipe.runs,
+            dataset=dataset,
+            models=models,
+        )
+        for recipe in recipes
+    ]
     if plan:
-        _say_cost(reproduction, settings, address)
+        _say_cost(reproductions, settings, address)
         return
     with services(settings, address) as (session, tracker):
-        run_reproduction(reproduction, settings, session, tracker)
+        for reproduction in reproductions:
+            run_reproduction(reproduction, settings, session, tracker)
 
 
-def _say_cost(reproduction: Any, settings: "Settings", address: str | None) -> None:
+def _say_cost(reproductions: "Sequence[Reproduction]", settings: "Settings", address: str | None) -> None:
     """Starts nothing; a cluster that runs is asked for its CPUs."""
     from cluster.reproduction.plan import cores
     from cluster.reproduction.run import say_cost
     from cluster.runtime.session import connect
 
     if not address:
-        say_cost(reproduction, settings, cores(settings))
+        for reproduction in reproductions:
+            say_cost(reproduction, settings, cores(settings))
         return
     with connect(settings.ray, address) as session:
-        say_cost(reproduction, settings, session.cpus)
+        for reproduction in reproductions:
+            say_cost(reproduction, settings, session.cpus)
 
 
 def _require_consistent(settings: "Settings", dataset: "Location | None", episodes: int | None) -> None:

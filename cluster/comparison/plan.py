@@ -1,6 +1,6 @@
 """What a comparison is of; what cannot be compared is refused here, before Ray and before the first run."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,11 +60,11 @@ class Grid:
         """The methods that need a trained model."""
         return [name for name in self.methods if methods.needs_model(name)]
 
-    def require(self, model: Path | None, candidates: Path | None) -> None:
+    def require(self, models: Sequence[Path], candidates: Path | None) -> None:
         """Refuse methods that lack their model, or their candidates.
 
         Args:
-            model: folder of a trained one; None for none.
+            models: folders of trained ones.
             candidates: folder of simulated ones; None for none.
 
         Raises:
@@ -76,7 +76,7 @@ class Grid:
                 f"{', '.join(simulated)} need candidates that were simulated: make some with "
                 "`svaedc candidates` and name their folder with --candidates"
             )
-        if self.with_model() and model is None:
+        if self.with_model() and not models:
             raise UsageError(
                 f"{', '.join(self.with_model())} need a trained model: name its folder with --model"
             )
@@ -118,7 +118,7 @@ class ComparisonPlan:
         setup: whose controllers are tried.
         grid: methods and seeds.
         job: what all runs share.
-        model: SHA-256 of the checkpoint; "" when no method asked for needs one.
+        model: SHA-256 of the checkpoint, of several joined by +; "" when no method asked for needs one.
         trained_on: the setup of the model's data where it is another one; "" elsewhere.
         slots: runs at a time.
         caption: of figure and page, before what they say themselves.
@@ -202,7 +202,7 @@ def plan_comparison(
     grid: Grid,
     trials: int,
     gap: str,
-    model: Path | None,
+    models: Sequence[Path],
     folder: Path,
     settings: CompareSettings,
     caption: str = "",
@@ -215,7 +215,8 @@ def plan_comparison(
         grid: methods and seeds.
         trials: suggested in each run.
         gap: level of the hidden physics, or its ranges written out.
-        model: folder of one trained on the setup, or on the one it stands in for; None without one.
+        models: folders of those trained on the setup, or on the one it stands in for. With several, the
+            runs of a seed take the one whose turn it is, so that intervals speak of trainings as well.
         folder: of the results.
         settings: of the runs.
         caption: of figure and page, before what they say themselves.
@@ -231,14 +232,15 @@ def plan_comparison(
     """
     with usage_errors():
         setup.gap(gap)
-    grid.require(model, candidates)
+    grid.require(models, candidates)
     table = candidates / TABLE if candidates is not None else None
-    path, trained_on = usable(model, setup) if grid.with_model() and model else (None, setup.name)
+    found = [usable(model, setup) for model in models] if grid.with_model() else []
+    paths, trained_on = [path for path, _ in found], {name for _, name in found if name != setup.name}
     job = ComparisonJob(
         folder=ComparisonFolder(folder.resolve()),
         setup=setup.name,
         gap=str(ranges(gap)) if "=" in gap else gap,  # so that equal ranges are one comparison
-        model=str(path.resolve()) if path else "",
+        models=tuple(str(path.resolve()) for path in paths),
         pool_size=settings.pool_size,
         initial=settings.initial_trials,
         trials=trials,
@@ -246,7 +248,7 @@ def plan_comparison(
         candidates=str(table.resolve()) if table is not None else "",
     )
     if table is not None:
-        require_usable(table, setup, path, settings.initial_trials)
+        require_usable(table, setup, paths, settings.initial_trials)
     try:
         job.require(grid.methods, setup)
     except LookupError as error:
@@ -257,8 +259,8 @@ def plan_comparison(
         setup=setup,
         grid=grid,
         job=job,
-        model=sha256(path) if path else "",
-        trained_on=trained_on if trained_on != setup.name else "",
+        model="+".join(map(sha256, paths)),
+        trained_on=", ".join(sorted(trained_on)),
         slots=settings.slots,
         caption=caption,
         candidates=sha256(table) if table is not None else NO_CANDIDATES,

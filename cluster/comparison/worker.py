@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from cluster.optimization.models import shared_model
 from svaedc.bo.loop import Trial, trials
 from workers import setups
 from workers.attempts import TIMEOUT_SECONDS, Attempts
+from workers.dataset.shards import sha256
 from workers.hardware import robots
 from workers.setups import Setup
 
@@ -36,7 +37,7 @@ class ComparisonJob:
         folder: of the results.
         setup: its name.
         gap: level of the hidden physics, or its ranges written out.
-        model: checkpoint; "" when no method needs one.
+        models: checkpoints; none when no method needs one. With several, runs take turns.
         pool_size: candidates of each run.
         initial: random trials that all methods of a seed share.
         trials: suggested trials after them.
@@ -47,7 +48,7 @@ class ComparisonJob:
     folder: ComparisonFolder
     setup: str
     gap: str
-    model: str
+    models: tuple[str, ...]
     pool_size: int
     initial: int
     trials: int
@@ -70,11 +71,11 @@ class ComparisonJob:
             ValueError: a method lacks what it needs, or its pool would run dry.
         """
         neediest = max(names, key=methods.needs_model)
-        problem = self.optimization(
-            RunKey(neediest, 0), setup
-        ).problem()  # holds what the others need as well
-        for name in names:
-            methods.require(name, problem, self.trials)
+        for turn in range(max(1, len(self.models))):
+            # What the neediest needs holds what the others need as well.
+            problem = self.optimization(RunKey(neediest, turn), setup).problem()
+            for name in names:
+                methods.require(name, problem, self.trials)
 
     def run(self, key: RunKey, setup: Setup, attempts: Attempts) -> Iterator[Trial]:
         """Try what a run still has to try.
@@ -107,13 +108,15 @@ class ComparisonJob:
             setup: whose controllers are tried.
 
         Returns:
-            With the model, if the run's method needs one.
+            With the model whose turn it is, if the run's method needs one.
         """
-        needs_model = methods.needs_model(key.method)
-        twin = robots.stands_in_for(self.setup)
-        model = shared_model(Path(self.model), self.setup, twin) if needs_model else None
         candidates = shared_candidates(Path(self.candidates)) if self.candidates else None
-        return Optimization(setup, key.method, key.run, self.pool_size, model, candidates=candidates)
+        planned = Optimization(setup, key.method, key.run, self.pool_size, candidates=candidates)
+        if not methods.needs_model(key.method):
+            return planned
+        path = Path(self.models[key.run % len(self.models)])
+        model = shared_model(path, self.setup, robots.stands_in_for(self.setup))
+        return replace(planned, model=model, checkpoint=sha256(path) if candidates else "")
 
 
 class RunTrainable(tune.Trainable):

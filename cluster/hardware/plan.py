@@ -93,8 +93,8 @@ def identify(
                 "`svaedc candidates` and name their folder with --candidates"
             )
         if candidates is not None:
-            encoder = model if needs_model else None
-            require_usable(candidates, registry.load(known.setup), encoder, RANDOM_TRIALS)
+            encoders = [model] if needs_model and model else []
+            require_usable(candidates, registry.load(known.setup), encoders, RANDOM_TRIALS)
         return CampaignIdentity(
             robot,
             known.setup,

@@ -67,6 +67,7 @@ class Proposals:
             _network(identity, model) if needs_model else None,
             identity.draws,
             _candidates(identity, candidates),
+            identity.model,
         )
         problem = optimization.problem()
         with usage_errors():

@@ -1,7 +1,7 @@
 """`candidates.parquet`: what simulation showed of every candidate, in every world, and what that is from."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -37,27 +37,17 @@ class CandidateTable:
         f: objectives, [candidate, world].
         y: badness.
         bad: share of steps in which each bad condition held.
-        tau: latent paths of the episodes, flattened; k is 0 without a model.
-        origin: plain values: setups, their parameters, gap, count, chosen, seed, fingerprints, the model's
-            SHA-256, names of the bad conditions, and setup and physics of each world.
+        tau: latent paths of the episodes, flattened, by the SHA-256 of the model that encoded them.
+        origin: plain values: setups, their parameters, gap, count, chosen, seed, fingerprints, sizes of
+            latent paths by model, names of the bad conditions, and setup and physics of each world.
     """
 
     x: Float32[np.ndarray, "n d"]
     f: Float64[np.ndarray, "n e"]
     y: Float64[np.ndarray, "n e"]
     bad: Float64[np.ndarray, "n e conditions"]
-    tau: Float64[np.ndarray, "n e k"]
+    tau: Mapping[str, Float64[np.ndarray, "n e k"]]
     origin: Mapping[str, Any]
-
-    @property
-    def has_latents(self) -> bool:
-        """Whether a model has encoded the episodes."""
-        return self.tau.shape[2] > 0
-
-    @property
-    def mean_latents(self) -> Float64[np.ndarray, "n k"]:
-        """Latent paths, averaged over the worlds."""
-        return self.tau.mean(axis=1)
 
     @property
     def drawn(self) -> Float32[np.ndarray, "m d"]:
@@ -68,18 +58,19 @@ class CandidateTable:
         """The outcomes, as methods take them."""
         return SimulatedOutcomes(torch.from_numpy(self.f), torch.from_numpy(self.y), Lookup(self.x))
 
-    def latents(self, pool: Float32[np.ndarray, "n d"]) -> Latents | None:
-        """Latent paths and badness of some of the candidates, as methods take them; None without a model.
+    def latents(self, pool: Float32[np.ndarray, "n d"], model: str) -> Latents | None:
+        """Latent paths and badness of some of the candidates, as methods take them.
 
         Args:
             pool: candidates, [n, D].
+            model: SHA-256 of the one that encoded the episodes.
 
         Returns:
-            Means of q(tau|xi, y) and of y over the worlds.
+            Means of q(tau|xi, y) and of y over the worlds; None where that model encoded nothing.
         """
-        if not self.has_latents:
+        if model not in self.tau:
             return None
-        tau, y = torch.from_numpy(self.mean_latents), torch.from_numpy(self.y.mean(axis=1))
+        tau, y = torch.from_numpy(self.tau[model].mean(axis=1)), torch.from_numpy(self.y.mean(axis=1))
         return Latents.of(torch.from_numpy(pool), SimulatedLatents(tau, y, Lookup(self.x)))
 
 
@@ -103,11 +94,11 @@ def write(path: Path, table: CandidateTable) -> None:
         "y_mean": table.y.mean(axis=1),
         "y_spread": table.y.std(axis=1),
     }
-    if table.has_latents:
+    for model, tau in table.tau.items():
         columns |= {
-            "tau": _lists(table.tau),
-            "tau_mean": _lists(table.mean_latents),
-            "tau_spread": _lists(table.tau.std(axis=1)),
+            _latents(model): _lists(tau),
+            f"{_latents(model)}_mean": _lists(tau.mean(axis=1)),
+            f"{_latents(model)}_spread": _lists(tau.std(axis=1)),
         }
     content = pa.table({"candidate": np.arange(len(table.x)), **columns})
     content = content.replace_schema_metadata({_ORIGIN: json.dumps(dict(table.origin), sort_keys=True)})
@@ -125,15 +116,15 @@ def read(path: Path) -> CandidateTable:
         content = pq.read_table(arrow_name(path), page_checksum_verification=True)
         origin = json.loads((content.schema.metadata or {})[_ORIGIN])
         count, worlds, conditions = content.num_rows, len(origin["worlds"]), len(origin["conditions"])
-        path_size = int(origin["path"])
         return CandidateTable(
             x=_dense(content["x"], (count, -1)),
             f=_dense(content["f"], (count, worlds)),
             y=_dense(content["y"], (count, worlds)),
             bad=_dense(content["bad"], (count, worlds, conditions)),
-            tau=_dense(content["tau"], (count, worlds, path_size))
-            if path_size
-            else np.empty((count, worlds, 0)),
+            tau={
+                model: _dense(content[_latents(model)], (count, worlds, int(size)))
+                for model, size in origin["models"].items()
+            },
             origin=origin,
         )
     except FileNotFoundError as error:
@@ -147,13 +138,13 @@ def read(path: Path) -> CandidateTable:
         ) from error
 
 
-def require_usable(path: Path, setup: Setup, model: Path | None, initial: int) -> None:
+def require_usable(path: Path, setup: Setup, models: Sequence[Path], initial: int) -> None:
     """Refuse candidates that a comparison or campaign of this robot cannot choose among.
 
     Args:
         path: of their table.
         setup: whose controllers are tried.
-        model: checkpoint that latent paths must be of; None where no method asks for a model.
+        models: checkpoints that encoded the episodes, unless none did.
         initial: random trials of a run, which are candidates that were drawn.
 
     Raises:
@@ -187,11 +178,12 @@ def require_usable(path: Path, setup: Setup, model: Path | None, initial: int) -
             f"{file_name(setup.name, KIND)} has changed since the candidates of {path.parent} were "
             "simulated: put it back as it was, or simulate them again in another folder"
         )
-    if model is not None and table.origin["model"] not in ("", sha256(model)):
-        raise UserError(
-            f"the latent paths of {path.parent} are of another model than {model}: simulate them again with "
-            "that one, in the same folder, which keeps the episodes"
-        )
+    for model in models:
+        if table.tau and sha256(model) not in table.tau:
+            raise UserError(
+                f"the latent paths of {path.parent} are of another model than {model}: simulate them again "
+                "with that one, in the same folder, which keeps the episodes"
+            )
 
 
 def parameters_of(setup: Setup) -> list[list[Any]]:
@@ -211,6 +203,11 @@ def origin_of(path: Path) -> Mapping[str, Any]:
         return dict(json.loads((pq.read_schema(arrow_name(path)).metadata or {})[_ORIGIN]))
     except (pa.ArrowException, OSError, KeyError, ValueError):
         return {}
+
+
+def _latents(model: str) -> str:
+    """Column of the latent paths by the model of that SHA-256."""
+    return f"tau_{model[:12]}"
 
 
 def _lists(values: np.ndarray) -> pa.Array:

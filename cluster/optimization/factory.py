@@ -40,6 +40,8 @@ class Optimization:
         model: in evaluation mode, its parameters frozen; None for methods that need none.
         draws: version of how controllers are drawn.
         candidates: simulated ones, which the run chooses among; None where its pool is drawn.
+        checkpoint: SHA-256 of the model's file, by which candidates know its latent paths; "" without
+            candidates or model.
     """
 
     setup: Setup
@@ -49,6 +51,7 @@ class Optimization:
     model: SvaeDc | None = None
     draws: int = DRAWS
     candidates: CandidateTable | None = None
+    checkpoint: str = ""
 
     def initial(self, index: int) -> Float32[np.ndarray, " D"]:
         """The random controller of one of the first trials, which all methods of a seed share.
@@ -79,7 +82,7 @@ class Optimization:
         )
         if self.model is None or not methods.needs_model(self.method):
             return problem
-        simulated = candidates.latents(pool) if candidates else None
+        simulated = candidates.latents(pool, self.checkpoint) if candidates else None
         return replace(
             problem,
             latents=simulated or Latents.of(torch.from_numpy(pool), self.model.latent_means),

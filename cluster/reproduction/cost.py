@@ -206,16 +206,16 @@ def _data(reproduction: Reproduction, settings: Settings, cores: int) -> Iterato
 
 
 def _models(reproduction: Reproduction, settings: Settings) -> Iterator[Item]:
-    for latent in reproduction.recipe.latents:
+    for wanted in reproduction.recipe.trainings:
         preset = reproduction.scale.preset
-        if reproduction.is_trained(latent):
-            yield Item(f"train {latent}: there already", Cost())
+        if reproduction.is_trained(wanted):
+            yield Item(f"train {wanted.name}: there already", Cost())
             continue
-        train = reproduction.training(settings.train, latent)
+        train = reproduction.training(settings.train, wanted.latent)
         updates = reproduction.updates(train)
-        cache = reproduction.cache_size(train) if latent == reproduction.trains[0] else 0
-        cost = training(reproduction.recipe.data, preset, latent, updates, cache)
-        yield Item(f"train {latent}: {updates} updates, preset {preset}", cost)
+        cache = reproduction.cache_size(train) if wanted == reproduction.trains[0] else 0
+        cost = training(reproduction.recipe.data, preset, wanted.latent, updates, cache)
+        yield Item(f"train {wanted.name}: {updates} updates, preset {preset}", cost)
 
 
 def _candidates(reproduction: Reproduction, settings: Settings, cores: int) -> Iterator[Item]:

@@ -1,7 +1,7 @@
 """The figures of the paper as recipes: which data, which model, which comparisons, and what was claimed.
 
-A further figure is one entry here; those asked again in MuJoCo are made from the paper's. Sections are
-those of the paper.
+A further figure is one entry here; those asked again in MuJoCo are made from the paper's, and `transfer` is a
+study of our own. Sections are those of the paper.
 """
 
 import difflib
@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from cluster.reproduction.recipe import THIRTY, Panel, Recipe
+from cluster.reproduction.ten_trials import TRANSFER, transfer_studies
 from cluster.reproduction.transfer import in_other_engine
 from svaedc.analysis.evidence import Claim, MedianGap, Steadier, Successes
 from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
@@ -233,6 +234,7 @@ _TRANSFERS = (("figure-5", "walk"), ("figure-8", "push"), ("figure-9", "left"))
 RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
     _FIGURES
     | {each.figure: each for each in (in_other_engine(_FIGURES[name], panel) for name, panel in _TRANSFERS)}
+    | {each.figure: each for each in transfer_studies()}
 )
 
 
@@ -244,5 +246,14 @@ def recipe(figure: str) -> Recipe:
     """
     if figure in RECIPES:
         return RECIPES[figure]
-    [nearest] = difflib.get_close_matches(figure, RECIPES, n=1, cutoff=0.0)
+    [nearest] = difflib.get_close_matches(figure, [*RECIPES, TRANSFER], n=1, cutoff=0.0)
     raise LookupError(f"no recipe for {figure!r}; did you mean {nearest!r}? There are {', '.join(RECIPES)}")
+
+
+def recipes(name: str) -> tuple[Recipe, ...]:
+    """The recipes of that name: one of a figure, those of all robots of `transfer`.
+
+    Raises:
+        LookupError: there is none; the message names the nearest.
+    """
+    return transfer_studies() if name == TRANSFER else (recipe(name),)

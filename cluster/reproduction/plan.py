@@ -10,7 +10,7 @@ from typing import Final
 from cluster.config import Settings, TrainSettings
 from cluster.errors import UserError
 from cluster.optimization.models import trained_model
-from cluster.reproduction.recipe import NINE, Panel, Recipe
+from cluster.reproduction.recipe import NINE, Panel, Recipe, Training
 from cluster.training.record import MEASURES
 from svaedc.training.presets import Sizes, preset, usual_stride
 from workers import setups
@@ -70,8 +70,8 @@ class Reproduction:
         runs: of each method.
         dataset: folder of the episodes.
         collects: whether they are collected; if not, they were given, or every model was.
-        models: folders by latent size.
-        trains: latent sizes whose model is trained; the other models were given.
+        models: folders by what they are trained for.
+        trains: what is trained; the other models were given.
         results: folder of the figure.
     """
 
@@ -82,8 +82,8 @@ class Reproduction:
     runs: int
     dataset: Location
     collects: bool
-    models: Mapping[str, Path]
-    trains: tuple[str, ...]
+    models: Mapping[Training, Path]
+    trains: tuple[Training, ...]
     results: Path
 
     def comparison(self, panel: Panel) -> Path:
@@ -93,8 +93,12 @@ class Reproduction:
     def candidates(self, panel: Panel) -> Path:
         """Folder of a panel's candidates, which panels that need the same ones share."""
         simulated = f"{'+'.join(panel.candidates)}-{CANDIDATES}x{WORLDS}"
-        encoded = f"-by-{self.models[panel.latent].name}" if panel.latent else ""
-        return self.folder / "candidates" / f"{simulated}{encoded}"
+        encoders = "+".join(path.name for path in self.models_of(panel))
+        return self.folder / "candidates" / (f"{simulated}-by-{encoders}" if encoders else simulated)
+
+    def models_of(self, panel: Panel) -> list[Path]:
+        """Folders of a panel's models, in the order in which its runs take turns."""
+        return [self.models[training] for training in panel.trainings]
 
     def missing_episodes(self) -> int:
         """Still to be collected."""
@@ -104,9 +108,9 @@ class Reproduction:
         done = _open(self.dataset, self.recipe.data).episodes() if begun else 0
         return max(0, self.episodes - done)
 
-    def is_trained(self, latent: str) -> bool:
-        """Whether the model of this size was given, or is there as a whole."""
-        return latent not in self.trains or (self.models[latent] / MEASURES).exists()
+    def is_trained(self, training: Training) -> bool:
+        """Whether this model was given, or is there as a whole."""
+        return training not in self.trains or (self.models[training] / MEASURES).exists()
 
     def training(self, settings: TrainSettings, latent: str) -> TrainSettings:
         """Adapt the settings of training to a size of the latent path.
@@ -157,7 +161,8 @@ def resolve(
         episodes: to collect.
         runs: of each method.
         dataset: that is there already; None to collect one.
-        models: that are there already; what each is for follows from its latent size.
+        models: that are there already; what each is for follows from its latent size, and of equal sizes from
+            their order.
 
     Returns:
         What `run_steps` does.
@@ -165,12 +170,12 @@ def resolve(
     Raises:
         UserError: a dataset or model cannot be read, or is of another setup or size.
     """
-    given = _models_by_setup(recipe, models)
-    trains = tuple(latent for latent in recipe.latents if latent not in given)
+    given = _given_models(recipe, models)
+    trains = tuple(training for training in recipe.trainings if training not in given)
     if dataset is not None:
         episodes = _open(dataset, recipe.data).episodes()
     name = f"{recipe.data}-{episodes}"
-    own = {latent: folder / "models" / f"{name}-{scale.preset}-{latent}" for latent in trains}
+    own = {each: folder / "models" / f"{name}-{scale.preset}-{each.name}" for each in trains}
     return Reproduction(
         recipe=recipe,
         scale=scale,
@@ -204,16 +209,17 @@ def _open(folder: Location, setup: str) -> Dataset:
     return dataset
 
 
-def _models_by_setup(recipe: Recipe, models: tuple[Path, ...]) -> dict[str, Path]:
-    found: dict[str, Path] = {}
+def _given_models(recipe: Recipe, models: tuple[Path, ...]) -> dict[Training, Path]:
+    found: dict[Training, Path] = {}
     for folder in models:
         latent = _latent(folder, recipe.data)
-        if latent not in recipe.latents or latent in found:
-            wanted = ", ".join(recipe.latents) or "none"
+        open_ones = [each for each in recipe.trainings if each.latent == latent and each not in found]
+        if not open_ones:
+            wanted = ", ".join(each.latent for each in recipe.trainings) or "none"
             raise UserError(
                 f"{folder} has the latent size {latent}; {recipe.figure} takes one model of each of: {wanted}"
             )
-        found[latent] = folder
+        found[open_ones[0]] = folder
     return found
 
 

@@ -1,6 +1,7 @@
 """What a figure of the paper is made from: its comparisons, their data and models, and what was claimed."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from svaedc.analysis.evidence import Claim
 from svaedc.bo import methods
@@ -8,6 +9,23 @@ from workers.hardware import robots
 
 NINE, THIRTY = "3x3", "5x6"
 """These are latent spaces, steps x dimensions: the paper's usual one, and its larger one (section 7.1)."""
+
+
+class Training(NamedTuple):
+    """A model that is trained for a figure.
+
+    Attributes:
+        latent: size of its latent path.
+        seed: of its training.
+    """
+
+    latent: str
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """Of its folder, after what it learns from."""
+        return f"{self.latent}-seed-{self.seed}" if self.seed else self.latent
 
 
 @dataclass(frozen=True)
@@ -24,6 +42,7 @@ class Panel:
         latent: size of the model's latent path; "" for methods that need no model.
         candidates: setups in which candidates are simulated before the trials; none where each run draws a
             pool of its own.
+        models: of as many training seeds, with which the runs take turns.
     """
 
     name: str
@@ -34,6 +53,7 @@ class Panel:
     gap: str = "paper"
     latent: str = NINE
     candidates: tuple[str, ...] = ()
+    models: int = 1
 
     def __post_init__(self) -> None:
         """Refuse methods that lack their model or their candidates."""
@@ -43,6 +63,11 @@ class Panel:
         needy = [name for name in self.methods if methods.needs_model(name)]
         if needy and not self.latent:
             raise ValueError(f"panel {self.name!r} needs a latent size for {', '.join(needy)}, got none")
+
+    @property
+    def trainings(self) -> tuple[Training, ...]:
+        """Of its models, in the order in which runs take turns; none without a latent size."""
+        return tuple(Training(self.latent, seed) for seed in range(self.models)) if self.latent else ()
 
     @property
     def stands_in(self) -> bool:
@@ -86,9 +111,9 @@ class Recipe:
                     raise ValueError(f"{self.figure} has no panel {evidence.panel!r}: {claim.text}")
 
     @property
-    def latents(self) -> tuple[str, ...]:
-        """Sizes of the models it needs, each once."""
-        return tuple(dict.fromkeys(panel.latent for panel in self.panels if panel.latent))
+    def trainings(self) -> tuple[Training, ...]:
+        """Of the models it needs, each once."""
+        return tuple(dict.fromkeys(training for panel in self.panels for training in panel.trainings))
 
     @property
     def stands_in(self) -> bool:

@@ -14,7 +14,7 @@ from cluster.datasets.plan import plan_collection
 from cluster.progress import say, timing
 from cluster.reproduction.cost import cost_items, lines
 from cluster.reproduction.plan import CANDIDATES, CANDIDATES_SEED, WORLDS, Reproduction
-from cluster.reproduction.recipe import Panel
+from cluster.reproduction.recipe import Panel, Training
 from cluster.reproduction.report import Table, publish, table
 from cluster.runtime.placement import free_machines
 from cluster.runtime.session import Session
@@ -114,9 +114,9 @@ def run_steps(
     if reproduction.missing_episodes():
         with timing(names.get("collect", f"collect {recipe.data}")):
             _collect(reproduction, settings, session, tracker)
-    for latent in reproduction.trains:
-        with timing(names.get("train", f"train {latent}")):
-            _train(reproduction, latent, settings, session, tracker)
+    for training in reproduction.trains:
+        with timing(names.get("train", f"train {training.name}")):
+            _train(reproduction, training, settings, session, tracker)
     for panel in recipe.panels:
         if panel.candidates:
             _simulate(reproduction, panel, settings, session, tracker)
@@ -139,14 +139,14 @@ def _collect(reproduction: Reproduction, settings: Settings, session: Session, t
 
 
 def _train(
-    reproduction: Reproduction, latent: str, settings: Settings, session: Session, tracker: Tracker
+    reproduction: Reproduction, training: Training, settings: Settings, session: Session, tracker: Tracker
 ) -> None:
     train(
         folder=reproduction.dataset,
-        model=reproduction.models[latent],
+        model=reproduction.models[training],
         preset=reproduction.scale.preset,
-        seed=0,
-        settings=reproduction.training(settings.train, latent),
+        seed=training.seed,
+        settings=reproduction.training(settings.train, training.latent),
         session=session,
         tracker=tracker,
     )
@@ -162,7 +162,7 @@ def _simulate(
         episodes=WORLDS,
         gap="wide",
         seed=CANDIDATES_SEED,
-        model=reproduction.models[panel.latent] if panel.latent else None,
+        models=reproduction.models_of(panel),
         chosen=None,
         folder=reproduction.candidates(panel),
         settings=settings.collect,
@@ -181,7 +181,7 @@ def _compare(
         grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
         trials=panel.trials,
         gap=panel.gap,
-        model=reproduction.models[panel.latent] if panel.latent else None,
+        models=reproduction.models_of(panel),
         folder=reproduction.comparison(panel),
         settings=settings.compare,
         caption=f"{recipe.figure}, {panel.name}: {panel.title}" if recipe.figure else "",

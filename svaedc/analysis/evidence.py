@@ -189,6 +189,46 @@ class Steadier:
         return Finding(value, counts[0], verdict)
 
 
+@dataclass(frozen=True)
+class FewerBroken:
+    """A method breaks fewer trials than another: at most so many for each of the other's.
+
+    Attributes:
+        panel: Name of the panel.
+        method: Whose trials are said to break less.
+        baseline: Whose trials they are held against.
+        ratio: Largest ratio of the two shares that agrees with the claim.
+    """
+
+    panel: str
+    method: str
+    baseline: str
+    ratio: float
+
+    @property
+    def measure(self) -> str:
+        """Whose shares, and their largest ratio."""
+        return f"{self.method} / {self.baseline}, broken trials ≤ {self.ratio:.2f}"
+
+    def finding(self, panels: Panels, initial: int) -> Finding:  # noqa: ARG002
+        """Holds if the ratio of the measured shares is not larger; it has no interval.
+
+        Args:
+            panels: Comparisons by the name of their panel.
+            initial: Not used: the summary has counted already.
+
+        Returns:
+            The ratio, or `UNKNOWN`, also where the baseline broke nothing.
+        """
+        found = [_method(panels.get(self.panel), name) for name in (self.method, self.baseline)]
+        shares = [method.broken_trials.mean if method else math.nan for method in found]
+        if not shares[1] > 0 or math.isnan(shares[0]):
+            return UNKNOWN
+        value, runs = shares[0] / shares[1], min(method.runs for method in found if method)
+        verdict: Verdict = "holds" if value <= self.ratio else "does not hold"
+        return Finding(Estimate(value, math.nan, math.nan), runs, verdict)
+
+
 def _method(summary: Summary | None, method: str) -> MethodSummary | None:
     found = summary.methods.get(method) if summary else None
     return found if found and found.runs else None

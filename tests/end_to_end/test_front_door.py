@@ -54,7 +54,7 @@ def test_the_optimiser_asks_for_what_the_comparison_of_its_seed_tries(tmp_path):
     asked = optimizer()
     tell(asked, 5)
     (tmp_path / "runs").mkdir()
-    job = ComparisonJob(ComparisonFolder(tmp_path), SETUP, "paper", "", pool_size=60, initial=2, trials=3)
+    job = ComparisonJob(ComparisonFolder(tmp_path), SETUP, "paper", (), pool_size=60, initial=2, trials=3)
     setup = setups.load(SETUP)
     with Attempts(setup) as attempts:
         run = list(job.run(RunKey("se", 1000), setup, attempts))

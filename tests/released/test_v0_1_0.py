@@ -116,7 +116,7 @@ def test_a_comparison_goes_on_with_the_same_controllers(tmp_path):
     assert [(str(key), len(trials)) for key, trials in runs.items()] == [
         *(("random 0", 5), ("random 1", 5), ("se 0", 5), ("se 1", 5)),
     ]
-    job = ComparisonJob(folder, "quadratic-30d", "paper", "", pool_size=50, initial=2, trials=3)
+    job = ComparisonJob(folder, "quadratic-30d", "paper", (), pool_size=50, initial=2, trials=3)
     for key in (RunKey("random", 1), RunKey("se", 0)):
         path = key.path(folder.path)
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:3]))
@@ -152,7 +152,7 @@ def test_a_new_campaign_draws_what_a_comparison_of_its_seed_draws(tmp_path):
     executor = Executor(plan)
     first, second, third = [executor.advance() for _ in range(3)][-1].trials
     executor.close()
-    job = ComparisonJob(ComparisonFolder(tmp_path), "franka", "paper", "", pool_size=40, initial=2, trials=1)
+    job = ComparisonJob(ComparisonFolder(tmp_path), "franka", "paper", (), pool_size=40, initial=2, trials=1)
     shared = job.optimization(RunKey("se", 5), setups.load("franka"))
     np.testing.assert_array_equal(first.x.astype(np.float32), shared.initial(0))
     history = History.empty(48).append(shared.initial(0), first.f).append(shared.initial(1), second.f)

@@ -17,14 +17,19 @@ FRANKA = setups.load("franka")
 SETTINGS = CollectSettings(episodes_per_shard=8, actors=2)
 
 
-@pytest.fixture(scope="session")
-def untrained(tmp_path_factory):
-    """A model's folder."""
-    folder = tmp_path_factory.mktemp("untrained")
-    torch.manual_seed(0)
+def untrained_model(folder, seed):
+    """Its folder."""
+    folder.mkdir(exist_ok=True)
+    torch.manual_seed(seed)
     model = SvaeDc(ModelConfig(48, len(FRANKA.observation), FRANKA.horizon // 5))
     checkpoint.save(folder / checkpoint.FILE, model, {"setup": "franka", "stride": 5})
     return folder
+
+
+@pytest.fixture(scope="session")
+def untrained(tmp_path_factory):
+    """A model's folder."""
+    return untrained_model(tmp_path_factory.mktemp("untrained"), seed=0)
 
 
 @pytest.fixture(scope="session")
@@ -33,7 +38,7 @@ def planned():
     chosen = np.random.default_rng(9).random((2, 48), dtype=np.float32)
 
     def plan(folder, **changes):
-        asked = {"count": 10, "episodes": 2, "gap": "wide", "seed": 1, "model": None, "chosen": chosen}
+        asked = {"count": 10, "episodes": 2, "gap": "wide", "seed": 1, "models": [], "chosen": chosen}
         asked |= {"setups": [FRANKA], "settings": SETTINGS}
         return plan_candidates(folder=folder, **{**asked, **changes})
 
@@ -43,7 +48,7 @@ def planned():
 @pytest.fixture(scope="session")
 def candidates(planned, untrained, tmp_path_factory):
     """Their folder, with latent paths; simulated by this process alone."""
-    plan = planned(tmp_path_factory.mktemp("candidates") / "c", model=untrained)
+    plan = planned(tmp_path_factory.mktemp("candidates") / "c", models=[untrained])
     roll_out(plan)
     summarise(plan)
     return plan.folder

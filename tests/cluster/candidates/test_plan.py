@@ -36,7 +36,7 @@ def test_other_candidates_in_the_folder_are_refused_naming_the_difference(candid
         ({"episodes": 3}, "repeats"),
     ):
         with pytest.raises(UserError, match=f"another dataset.*{named}"):
-            planned(candidates, model=untrained, **changes)
+            planned(candidates, models=[untrained], **changes)
 
 
 def test_setups_of_different_robots_and_more_chosen_than_asked_for_are_refused(planned, tmp_path):

@@ -14,7 +14,7 @@ def compared(ray_session, tracking_settings, tmp_path):
 
     def run(
         methods="random,se",
-        model=None,
+        models=(),
         gap="paper",
         settings=SETTINGS,
         runs=2,
@@ -27,7 +27,7 @@ def compared(ray_session, tracking_settings, tmp_path):
             grid=Grid(tuple(methods.split(",")), seed=1000, runs=runs),
             trials=trials,
             gap=gap,
-            model=model,
+            models=models,
             folder=folder,
             settings=settings,
         )

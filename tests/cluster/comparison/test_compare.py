@@ -11,7 +11,7 @@ from tests.cluster.comparison.comparing import mlflow_runs, table, untrained
 
 
 def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, tracking_settings):
-    out = compared("random,screened-random,svae-dc", model=untrained(tmp_path / "model"))
+    out = compared("random,screened-random,svae-dc", models=[untrained(tmp_path / "model")])
     rows = table(out)
     assert len(rows) == 3 * 2 * 4
     assert [*rows[0]] == [
@@ -90,10 +90,10 @@ def test_an_explicit_gap_is_recorded_by_its_ranges_however_they_are_written(comp
 def test_the_model_belongs_to_a_comparison_from_the_first_method_that_needs_one(compared, tmp_path):
     one, other = untrained(tmp_path / "one"), untrained(tmp_path / "other", seed=1)
     compared("random", runs=1)
-    compared("random", model=other, runs=1)
-    compared("random,svae", model=one, runs=1)
-    compared("se", model=other, runs=1)
+    compared("random", models=[other], runs=1)
+    compared("random,svae", models=[one], runs=1)
+    compared("se", models=[other], runs=1)
     out = compared("matern", runs=1)
     assert {row["method"] for row in table(out)} == {"random", "svae", "se", "matern"}
     with pytest.raises(UserError, match=r"holds a comparison with model '\w+', not '\w+'"):
-        compared("svae-dc", model=other, runs=1)
+        compared("svae-dc", models=[other], runs=1)

@@ -24,7 +24,7 @@ def plan_of(folder):
         grid=Grid(METHODS, seed=0, runs=2),
         trials=2,
         gap="paper",
-        model=None,
+        models=[],
         folder=folder,
         settings=CompareSettings(pool_size=50),
     )

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from cluster.comparison.plan import Grid, plan_comparison, usable
+from cluster.comparison.records import RunKey
 from cluster.config import CompareSettings
 from cluster.errors import UsageError, UserError
 from svaedc.model import checkpoint
@@ -15,9 +16,11 @@ from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.presets import Sizes, compact, vary
 from tests.cluster.comparison.comparing import SETTINGS, untrained
 from workers import setups
+from workers.dataset.shards import sha256
 
 CART = """
 from workers import setups
+from workers.dataset.shards import sha256
 
 def setup():
     return setups.load("quadratic-30d")
@@ -57,12 +60,12 @@ def test_a_method_without_its_model_is_refused(compared):
 
 def test_a_model_of_another_setup_or_a_damaged_one_is_refused(compared, tmp_path):
     with pytest.raises(UserError, match="made for setup 'yumi', not 'franka'"):
-        compared("svae", model=untrained(tmp_path / "other", setup="yumi"))
+        compared("svae", models=[untrained(tmp_path / "other", setup="yumi")])
     (tmp_path / "other" / "model.pt").write_bytes(b"no")
     with pytest.raises(UserError, match="damaged"):
-        compared("svae", model=tmp_path / "other")
+        compared("svae", models=[tmp_path / "other"])
     with pytest.raises(UserError, match="cannot use the model"):
-        compared("svae", model=tmp_path / "nowhere")
+        compared("svae", models=[tmp_path / "nowhere"])
 
 
 def planned_with(**changes):
@@ -82,8 +85,8 @@ def test_a_model_without_badness_is_refused_for_methods_that_compress_before_any
     (tmp_path / "svae").mkdir()
     checkpoint.save(tmp_path / "svae" / "model.pt", model, {"setup": "franka"})
     with pytest.raises(UserError, match="'svae-dc': the model must predict badness, got an SVAE"):
-        planned_with(model=tmp_path / "svae", folder=tmp_path / "out")
-    planned_with(grid=Grid(("svae",), 1000, 1), model=tmp_path / "svae", folder=tmp_path / "out")
+        planned_with(models=[tmp_path / "svae"], folder=tmp_path / "out")
+    planned_with(grid=Grid(("svae",), 1000, 1), models=[tmp_path / "svae"], folder=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -93,11 +96,11 @@ def test_a_pool_with_fewer_controllers_than_trials_is_refused_naming_the_setting
     with pytest.raises(
         UserError, match=r"compare\.pool_size is 15.*may choose from 5 of 15 .* fewer than its 6 trials"
     ):
-        planned_with(grid=grid, trials=6, model=model, settings=few, folder=tmp_path / "out")
+        planned_with(grid=grid, trials=6, models=[model], settings=few, folder=tmp_path / "out")
 
 
 def claimed(folder, setup, methods=("random",)):
-    plan = planned_with(grid=Grid(methods, 1000, 1), setup=setup, model=None, folder=folder)
+    plan = planned_with(grid=Grid(methods, 1000, 1), setup=setup, models=[], folder=folder)
     (folder / "runs").mkdir(exist_ok=True)
     return plan.claim()
 
@@ -179,3 +182,14 @@ def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_of_the_same_cha
 def test_more_slots_than_cpus_are_refused(compared):
     with pytest.raises(UserError, match="needs 7 CPUs"):
         compared("random", settings=CompareSettings(slots=7, pool_size=200))
+
+
+def test_with_several_models_the_runs_take_turns(tmp_path):
+    folders = [untrained(tmp_path / name) for name in ("one", "other")]
+    plan = planned_with(models=folders, folder=tmp_path / "out")
+    digests = plan.model.split("+")
+    assert digests == [sha256(folder / "model.pt") for folder in folders]
+    used = [plan.job.optimization(RunKey("svae-dc", run), plan.setup).model for run in range(1000, 1004)]
+    assert used[0] is used[2]
+    assert used[1] is used[3]
+    assert used[0] is not used[1]

@@ -34,7 +34,7 @@ KEYS = [RunKey(method, run) for run in (1000, 1001) for method in ("random", "se
 
 def job_in(folder) -> ComparisonJob:
     (folder / "runs").mkdir(parents=True)
-    return ComparisonJob(ComparisonFolder(folder), SETUP.name, "paper", "", pool_size=60, initial=2, trials=6)
+    return ComparisonJob(ComparisonFolder(folder), SETUP.name, "paper", (), pool_size=60, initial=2, trials=6)
 
 
 def run(job: ComparisonJob, key: RunKey) -> None:

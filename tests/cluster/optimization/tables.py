@@ -15,8 +15,7 @@ ORIGIN = {
     "chosen": 5,
     "conditions": ["a", "b"],
     "worlds": [{"setup": "franka"}] * 3,
-    "model": "",
-    "path": 4,
+    "models": {"0" * 64: 4},
 }
 
 
@@ -26,6 +25,6 @@ def table(**changes):
         f=RNG.random((30, 3)),
         y=RNG.random((30, 3)),
         bad=RNG.random((30, 3, 2)),
-        tau=RNG.random((30, 3, 4)),
+        tau={model: RNG.random((30, 3, size)) for model, size in {**ORIGIN, **changes}["models"].items()},
         origin={**ORIGIN, **changes},
     )

@@ -8,6 +8,7 @@ from cluster.optimization.candidates import TABLE, read, require_usable, write
 from cluster.optimization.factory import Optimization
 from tests.cluster.optimization.tables import FRANKA, table
 from workers import setups
+from workers.dataset.shards import sha256
 from workers.rollout import VERSION
 
 
@@ -15,8 +16,9 @@ def test_what_is_written_is_read_again(tmp_path):
     one = table()
     write(tmp_path / TABLE, one)
     other = read(tmp_path / TABLE)
-    for name in ("x", "f", "y", "bad", "tau"):
+    for name in ("x", "f", "y", "bad"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert np.array_equal(one.tau["0" * 64], other.tau["0" * 64])
     assert other.origin == one.origin
 
 
@@ -36,7 +38,7 @@ def test_a_table_that_is_missing_or_damaged_is_told_with_the_command_that_makes_
         ({}, "yumi", "whose parameters are not those of yumi"),
         ({}, "daisy-27d", "have 48 parameters, daisy-27d has 27"),
         ({"rollout_version": VERSION + 1}, "franka", f"by version {VERSION + 1} of the simulation"),
-        ({"model": "0" * 64}, "franka", "latent paths of .* are of another model"),
+        ({}, "franka", "latent paths of .* are of another model"),
         ({"setup_digests": ["0" * 64]}, "franka", "has changed since the candidates of"),
         ({"chosen": 29}, "franka", "must hold 2 that were drawn.*got 1: simulate more"),
     ],
@@ -46,9 +48,10 @@ def test_candidates_of_another_robot_version_or_model_are_refused(tmp_path, chan
     model = tmp_path / "model.pt"
     model.write_bytes(b"weights")
     with pytest.raises(UserError, match=named):
-        require_usable(tmp_path / TABLE, setups.load(setup), model, 2)
-    write(tmp_path / TABLE, table())
-    require_usable(tmp_path / TABLE, FRANKA, model, 2)
+        require_usable(tmp_path / TABLE, setups.load(setup), [model], 2)
+    for encoders, asked in (({sha256(model): 4}, [model]), ({}, [model]), ({"0" * 64: 4}, [])):
+        write(tmp_path / TABLE, table(models=encoders))
+        require_usable(tmp_path / TABLE, FRANKA, asked, 2)
 
 
 def test_a_run_begins_with_drawn_candidates_and_chooses_among_all_of_them():
@@ -71,6 +74,7 @@ def test_of_more_candidates_than_a_pool_holds_each_seed_draws_its_own():
 
 def test_simulated_features_take_the_place_of_learnt_ones():
     candidates = table()
-    latents = candidates.latents(candidates.x[:7])
-    np.testing.assert_allclose(latents.tau.numpy(), candidates.tau[:7].mean(axis=1))
+    latents = candidates.latents(candidates.x[:7], "0" * 64)
+    np.testing.assert_allclose(latents.tau.numpy(), candidates.tau["0" * 64][:7].mean(axis=1))
+    assert candidates.latents(candidates.x[:7], "1" * 64) is None
     np.testing.assert_allclose(latents.y.numpy(), candidates.y[:7].mean(axis=1))

@@ -3,9 +3,9 @@
 import pytest
 
 from cluster.reproduction.cost import comparing, training
-from cluster.reproduction.paper_figures import RECIPES, recipe
+from cluster.reproduction.paper_figures import RECIPES, recipe, recipes
 from cluster.reproduction.plan import SCALES, scale
-from cluster.reproduction.recipe import Panel, Recipe
+from cluster.reproduction.recipe import Panel, Recipe, Training
 from cluster.reproduction.transfer import in_other_engine
 from svaedc.analysis.evidence import Claim, MedianGap
 from svaedc.analysis.paired_evidence import Gain
@@ -34,7 +34,7 @@ def test_robots_runs_and_trials_are_those_of_the_paper(figure, budget):
 def test_the_franka_figure_has_a_panel_of_each_kind():
     left, middle, right = RECIPES["figure-9"].panels
     assert (left.latent, middle.latent, right.latent) == ("3x3", "5x6", "3x3")
-    assert RECIPES["figure-9"].latents == ("3x3", "5x6")
+    assert RECIPES["figure-9"].trainings == (Training("3x3"), Training("5x6"))
     assert {"matern", "svae-matern", "svae-dc-matern"} <= set(right.methods)
 
 
@@ -47,6 +47,20 @@ def test_a_figure_is_asked_again_of_robots_in_another_engine_with_its_own_model_
     assert (panel.setup, panel.gap) == (f"{first.setup}-mujoco", "wide")
     assert again.claims
     assert set(again.claims) <= set(paper.claims)
+
+
+def test_the_study_of_ten_trials_hides_three_robots_in_three_ways_and_trains_twice():
+    studies = recipes("transfer")
+    assert [each.data for each in studies] == ["franka", "yumi", "daisy-27d"]
+    assert all(each.trainings == (Training("3x3"), Training("3x3", 1)) for each in studies)
+    for each in studies:
+        hidden = {(panel.setup.removeprefix(each.data), panel.gap) for panel in each.panels}
+        assert hidden == {("", "paper"), ("", "wide"), ("-mujoco", "wide")}
+        simulated = [panel for panel in each.panels if panel.candidates]
+        assert len(simulated) == 3
+        assert all("simulated-best" in panel.methods for panel in simulated)
+        assert all(panel.candidates == (each.data,) for panel in simulated)
+    assert recipes("figure-9") == (RECIPES["figure-9"],)
 
 
 def test_a_panel_that_a_figure_lacks_is_not_asked_of_another_engine():

@@ -8,6 +8,7 @@ from cluster.config import TrainSettings
 from cluster.errors import UserError
 from cluster.reproduction.paper_figures import RECIPES
 from cluster.reproduction.plan import SCALES
+from cluster.reproduction.recipe import Training
 from tests.cluster.reproduction.tiny import TINY, costs, plan_of, untrained
 
 
@@ -21,10 +22,10 @@ def test_figures_of_one_robot_share_its_data_and_model(tmp_path):
 def test_a_given_model_spares_data_and_training_and_the_other_size_is_still_trained(tmp_path):
     model = untrained(tmp_path / "given")
     push = plan_of(TINY, tmp_path, models=[model])
-    assert (push.collects, push.trains, push.models) == (False, (), {"3x3": model})
+    assert (push.collects, push.trains, push.models) == (False, (), {Training("3x3"): model})
     assert all(cost.seconds == 0 for step, cost in costs(push).items() if step.startswith("train"))
     both = plan_of(RECIPES["figure-9"], tmp_path, models=[model])
-    assert (both.collects, both.trains) == (True, ("5x6",))
+    assert (both.collects, both.trains) == (True, (Training("5x6"),))
     other = untrained(tmp_path / "larger", latent="5x6")
     assert plan_of(RECIPES["figure-9"], tmp_path, models=[other, model]).trains == ()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from svaedc.analysis.aggregation import summarize
-from svaedc.analysis.evidence import Claim, Evidence, MedianGap, Steadier, Successes
+from svaedc.analysis.evidence import Claim, Evidence, FewerBroken, MedianGap, Steadier, Successes
 from svaedc.analysis.paired_evidence import Gain, Like, NoBetter
 from svaedc.analysis.summary import Reporting, Row
 
@@ -125,3 +125,20 @@ def test_every_measure_says_what_it_is_about():
 def test_a_claim_without_evidence_is_refused():
     with pytest.raises(ValueError, match="at least one piece of evidence, got none for 'it is so'"):
         Claim("it is so", "section 1", ())
+
+
+def test_shares_of_broken_trials_are_held_against_each_other():
+    rows = [
+        Row(method, run, trial, f, success=False)
+        for method, broken in {"careful": 2, "wild": 6, "never": 0}.items()
+        for run in range(3)
+        for trial, f in enumerate([0.0, 0.0, *[-2.0] * broken, *[0.0] * (8 - broken)])
+    ]
+    reporting = Reporting(initial=INITIAL, broken_below=-1.0)
+    panels = {"it": summarize(rows, reporting, np.random.default_rng(0))}
+    fewer = FewerBroken("it", "careful", "wild", 0.5).finding(panels, INITIAL)
+    assert (fewer.value.mean, fewer.runs, fewer.verdict) == (pytest.approx(1 / 3), 3, "holds")
+    assert FewerBroken("it", "careful", "wild", 0.3).finding(panels, INITIAL).verdict == "does not hold"
+    for method, baseline in (("careful", "never"), ("careful", "absent"), ("absent", "wild")):
+        assert FewerBroken("it", method, baseline, 1.0).finding(panels, INITIAL).verdict == "not measured"
+    assert FewerBroken("it", "careful", "wild", 2 / 3).measure == "careful / wild, broken trials ≤ 0.67"
