@@ -1,6 +1,7 @@
 """The user's home, which a container may lack: no HOME, a user without a name, or a read-only one."""
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -32,6 +33,30 @@ def require_home() -> None:
         if home.stat().st_uid != os.getuid():  # somebody else was here first
             home = Path(tempfile.mkdtemp(prefix="svaedc-"))
         os.environ["HOME"] = str(home)
+
+
+SHARED_STATE = Path("/var/lib/svaedc")
+"""What all users of a machine share lies here, where there is such a folder."""
+
+
+def robot_folder(robot: str) -> Path:
+    """The home of a robot: that which all users share, if there is one; else this user's.
+
+    Args:
+        robot: its name.
+
+    Returns:
+        A folder, which need not exist.
+
+    Raises:
+        ValueError: nobody knows where the user's home is.
+    """
+    name = re.sub(r"[^\w.-]", "-", robot)
+    shared = SHARED_STATE / "robots" / name
+    if shared.is_dir():
+        return shared
+    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
+    return expand_home(Path(state)) / "svaedc" / "robots" / name
 
 
 def cache_folder() -> Path:

@@ -1,11 +1,14 @@
 """Fixtures shared by all tests; they import the packages inside, after the type checker is in place."""
 
+import atexit
 import os
 import secrets
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 import urllib.request
 from pathlib import Path
@@ -32,6 +35,9 @@ os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
 # Clusters of the tests have a token of their own and leave ~/.ray alone.
 os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# Robots of the tests have their homes in a folder of this run.
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="svaedc-tests-")
+atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
 # Object stores of the tests are on loopback, and nobody's own account or store is found by accident.
 for name in ("AWS_PROFILE", "AWS_SESSION_TOKEN", "AWS_ENDPOINT_URL", "AWS_ENDPOINT_URL_S3", "AWS_REGION"):
     os.environ.pop(name, None)

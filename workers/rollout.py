@@ -10,6 +10,7 @@ Example:
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -50,15 +51,57 @@ def rollout(setup: Setup, environment: Environment, x: np.ndarray, physics: Phys
         raise ValueError(
             f"physics must name the parameters of {setup.name}; missing or unknown: {', '.join(odd)}"
         )
-    controller = unit_cube(x, setup.dimensions)
-    environment.reset(physics)
-    command = setup.controller.start(controller, environment, setup.horizon)
+    steps = Steps(setup, environment, x, physics)
     if setup.stop is never:
-        records, reason = environment.run_commands(command, setup.horizon), ""
-    else:
-        records, reason = _run_until_stop(setup, environment, command)
-    observed = check_observed(environment.observed(records), setup.observation, len(records), setup.name)
-    return _episode(setup, observed, reason, controller, physics)
+        return steps.run_through()
+    while (command := steps.command()) is not None:
+        steps.apply(command)
+    return steps.episode()
+
+
+class Steps:
+    """An episode that runs command by command, in a loop that may look at each before it is applied.
+
+    Args:
+        setup: robot, controller and task.
+        environment: the setup's, open; it is reset.
+        x: the controller, [D], in [0, 1].
+        physics: a value for every parameter of the setup, by name.
+
+    Raises:
+        ValueError: when x is not a vector of D numbers in [0, 1].
+    """
+
+    def __init__(self, setup: Setup, environment: Environment, x: np.ndarray, physics: Physics) -> None:
+        self._setup, self._environment, self._physics = setup, environment, physics
+        self._x = unit_cube(x, setup.dimensions)
+        environment.reset(physics)
+        self._command: Command = setup.controller.start(self._x, environment, setup.horizon)
+        self._records: Any = []
+        self._reason = ""
+
+    def run_through(self) -> Episode:
+        """All steps at once, as the environment runs them fastest; no rule stops them early."""
+        self._records = self._environment.run_commands(self._command, self._setup.horizon)
+        return self.episode()
+
+    def command(self) -> Sequence[float] | None:
+        """The command of the next step; None after the last, or once a rule has stopped the episode."""
+        step = len(self._records)
+        return None if self._reason or step == self._setup.horizon else self._command(step)
+
+    def apply(self, command: Sequence[float]) -> None:
+        """Make a step with a command."""
+        self._records.append(self._environment.step(command))
+        if self._setup.stop is not never:
+            self._reason = self._setup.stop(self._environment.observed(self._records[-1:]))
+
+    def episode(self) -> Episode:
+        """What the steps so far were worth; at least one was made."""
+        setup, records = self._setup, self._records
+        observed = self._environment.observed(records)
+        checked = check_observed(observed, setup.observation, len(records), setup.name)
+        return _episode(setup, checked, self._reason, self._x, self._physics)
 
 
 def draw(setup: Setup, seed: int, index: int, repeats: int = 1) -> tuple[Float32[np.ndarray, " d"], Physics]:
@@ -128,17 +171,6 @@ def failed_episode(setup: Setup, x: np.ndarray, physics: Physics, failure: Failu
     nothing = np.empty((len(setup.observation), 0), np.float32)
     episode = _worthless_episode(setup, nothing, unit_cube(x, setup.dimensions), physics, FAILED)
     return replace(episode, failure=failure)
-
-
-def _run_until_stop(setup: Setup, environment: Environment, command: Command) -> tuple[Any, str]:
-    """The records up to the step at which the setup's rule stops, that one included, and its reason."""
-    records = []
-    for t in range(setup.horizon):
-        records.append(environment.step(command(t)))
-        reason = setup.stop(environment.observed(records[-1:]))
-        if reason:
-            return records, reason
-    return records, ""
 
 
 def _episode(setup: Setup, observed: Observed, reason: str, x: np.ndarray, physics: Physics) -> Episode:

@@ -36,6 +36,21 @@ Folder = Annotated[
 ]
 TrialNumber = Annotated[int, typer.Option("--trial", min=0, help="Its number, as `status` shows it.")]
 Who = Annotated[str, typer.Option("--who", help="Your name; kept in the journal.")]
+Note = Annotated[str, typer.Option("--note", help="What you saw, or why; kept in the journal.")]
+RobotName = Annotated[str, typer.Argument(help="Which robot, as `svaedc robots` names it.")]
+Home = Annotated[
+    Path | None,
+    typer.Option(
+        "--home",
+        help="Folder of all that is true of the robot; by default that in /var/lib/svaedc/robots, "
+        "or else one in the user's state folder.",
+        callback=durable,
+    ),
+]
+Confirmed = Annotated[
+    float | None,
+    typer.Option("--confirm", help="The objective again, where it lies outside what the setup allows."),
+]
 
 AsJson = Annotated[
     bool,
@@ -74,6 +89,7 @@ def start(
     pace: Annotated[
         float, typer.Option("--pace", min=0.0, help="Least seconds of a rehearsal's trial.")
     ] = 0.0,
+    home: Home = None,
     seed: Seed = 0,
     config: Config = None,
     overrides: Overrides = None,
@@ -90,7 +106,7 @@ def start(
     table = candidates / TABLE if candidates else None
     pool = settings.hardware.pool_size
     identity = identify(robot, method, trials, seed, pool, checkpoint, approval, table)
-    plan = CampaignPlan(identity, folder, checkpoint, pace, table)
+    plan = CampaignPlan(identity, folder, checkpoint, pace, table, home)
     with services(settings, address) as (session, tracker):
         last = run_start(settings.hardware, session, tracker, plan, _report, say)
     _show(last)
@@ -109,11 +125,66 @@ def status(folder: Folder, *, as_json: AsJson = False) -> None:
 
 
 @app.command()
-def approve(folder: Folder, trial: TrialNumber, who: Who) -> None:
-    """Let a checked trial onto the robot."""
+def stop(
+    robot: RobotName,
+    who: Annotated[str, typer.Option("--who", help="Your name.")] = "somebody",
+    reason: Annotated[str, typer.Option("--reason", help="Why.")] = "asked for",
+    home: Home = None,
+) -> None:
+    """Stop a robot, whatever else hangs. NO SAFETY FUNCTION: a robot needs an emergency stop of its own."""
+    from cluster.hardware.robot import stopping
+
+    found = stopping.stop(robot, home, who, reason)
+    say(found.advice)
+
+
+@app.command()
+def clear(robot: RobotName, who: Who, note: Note, home: Home = None) -> None:
+    """Let a stopped robot move again, once you have seen that it stands still and is reset."""
+    from cluster.hardware.robot import stopping
+
+    why = stopping.clear(robot, home, who, note)
+    say(f"{robot} may move again; it had been {why}" if why else f"{robot} was not stopped")
+
+
+@app.command()
+def approve(
+    folder: Folder,
+    trial: TrialNumber,
+    who: Who,
+    minutes: Annotated[float, typer.Option("--minutes", help="The approval holds so long.")] = 60.0,
+) -> None:
+    """Let a checked trial onto the robot: this controller, under these limits, for a while."""
     from cluster.hardware import operator
 
-    operator.approve(folder, trial, who)
+    operator.approve(folder, trial, who, minutes)
+    _show(operator.status(folder))
+
+
+@app.command()
+def withdraw(folder: Folder, trial: TrialNumber, who: Who) -> None:
+    """Take an approval back, as long as the trial has not begun."""
+    from cluster.hardware import operator
+
+    operator.withdraw(folder, trial, who)
+    _show(operator.status(folder))
+
+
+@app.command()
+def reject(folder: Folder, trial: TrialNumber, who: Who, note: Note) -> None:
+    """Keep a trial off the robot; neither it nor one near it is suggested again."""
+    from cluster.hardware import operator
+
+    operator.reject(folder, trial, who, note)
+    _show(operator.status(folder))
+
+
+@app.command()
+def adopt(folder: Folder, who: Who, home: Home = None) -> None:
+    """Vouch for a campaign that moved the robot under another home."""
+    from cluster.hardware import operator
+
+    operator.adopt(folder, who, home)
     _show(operator.status(folder))
 
 
@@ -123,14 +194,32 @@ def resolve(
     trial: TrialNumber,
     outcome: Annotated[str, typer.Option("--outcome", help="measured, failed or aborted.")],
     who: Who,
-    note: Annotated[str, typer.Option("--note", help="What you saw; kept in the journal.")],
+    note: Note,
     f: Annotated[float | None, typer.Option("--f", help="Objective, of a measured trial.")] = None,
     y: Annotated[float | None, typer.Option("--y", help="Badness in [0, 1], of a measured trial.")] = None,
+    confirm: Confirmed = None,
 ) -> None:
     """Say what became of an unknown trial, once the robot stands still and is reset."""
     from cluster.hardware import operator
 
-    operator.resolve(folder, trial, outcome, who, note, f, y)
+    operator.resolve(folder, trial, outcome, who, note, f, y, confirm)
+    _show(operator.status(folder))
+
+
+@app.command()
+def amend(
+    folder: Folder,
+    trial: TrialNumber,
+    who: Who,
+    note: Note,
+    f: Annotated[float, typer.Option("--f", help="Objective.")],
+    y: Annotated[float, typer.Option("--y", help="Badness in [0, 1].")],
+    confirm: Confirmed = None,
+) -> None:
+    """Correct what a trial measured; the old value stays in the journal."""
+    from cluster.hardware import operator
+
+    operator.amend(folder, trial, who, note, f, y, confirm)
     _show(operator.status(folder))
 
 

@@ -1,18 +1,21 @@
 """A hardware campaign: which step comes next, and that each is in the journal before the robot feels it."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
-from cluster.hardware.events import CampaignTrial
+from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.states import TERMINAL, State
-from cluster.hardware.status import RANDOM_TRIALS, Phase, phase_of
+from cluster.hardware.status import RANDOM_TRIALS, Phase, RobotGate, phase_at, phase_of
 from svaedc.bo.history import History
-from workers.hardware.driver import RobotDriver, RobotFault
+from workers.hardware.driver import Motion, RobotBroke, RobotDriver, RobotFault, RobotStopped
+from workers.user_code import describe
 
 
 @runtime_checkable
@@ -40,6 +43,27 @@ class Proposer(Protocol):
         ...
 
 
+@runtime_checkable
+class CampaignGate(RobotGate, Protocol):
+    """What must be true of the robot before a trial may move it; see `workers.hardware.gate.Gate`."""
+
+    def grant(self, campaign: str, trial_id: str, journal: str) -> None:
+        """Tell the robot's ledger which journal lets a trial move it."""
+        ...
+
+    def motion(self, trial_id: str) -> Motion:
+        """What the robot's ledger says of a trial."""
+        ...
+
+    def plan(self, trial_id: str, x: np.ndarray) -> Mapping[str, Any]:
+        """What a controller will ask of the robot, with an objection where it must not run."""
+        ...
+
+    def approval(self) -> Mapping[str, Any]:
+        """What an approval is bound to, besides the controller."""
+        ...
+
+
 @dataclass(frozen=True)
 class Campaign:
     """What the steps of a campaign work with.
@@ -47,6 +71,7 @@ class Campaign:
     Attributes:
         journal: the truth about every trial.
         robot: that is moved.
+        gate: stands before it.
         proposals: where controllers come from.
         dimensions: D of the robot's setup.
         process: the host, boot and process id that act, kept as evidence.
@@ -55,6 +80,7 @@ class Campaign:
 
     journal: Journal
     robot: RobotDriver
+    gate: CampaignGate
     proposals: Proposer
     dimensions: int
     process: Mapping[str, Any]
@@ -85,8 +111,8 @@ def recover(campaign: Campaign) -> None:
     for trial in campaign.journal.trials():
         if trial.state not in (State.GRANTED, State.RUNNING):
             continue
-        motion = campaign.robot.motion(trial_id(campaign.journal, trial))
-        never_started = trial.state is State.GRANTED and not motion.started
+        motion = campaign.gate.motion(trial_id(campaign.journal, trial))
+        never_started = trial.state is State.GRANTED and not motion.started and motion.certain
         new = State.APPROVED if never_started else State.UNKNOWN
         record(
             campaign.journal, trial, new, "recovery", {"ledger": asdict(motion), "found_by": campaign.process}
@@ -101,13 +127,14 @@ def history(trials: tuple[CampaignTrial, ...], dimensions: int) -> History:
         dimensions: D of the setup.
 
     Returns:
-        Measured trials with their objective; failed and aborted ones with NaN, only as tried before.
+        Measured trials with their objective; failed, aborted and rejected ones with NaN, as never to be tried
+        again.
     """
     past = History.empty(dimensions)
     for trial in trials:
         if trial.state is State.MEASURED:
             past = past.append(trial.x, trial.measurement[0])
-        elif trial.state in (State.FAILED, State.ABORTED):
+        elif trial.state in (State.FAILED, State.ABORTED, State.REJECTED):
             past = past.append(trial.x, float("nan"))
     return past
 
@@ -164,7 +191,8 @@ def record(
 
 
 def _phase(campaign: Campaign) -> Phase:
-    return phase_of(campaign.journal.trials(), campaign.journal.identity)
+    trials = campaign.journal.trials()
+    return phase_at(campaign.gate, phase_of(trials, campaign.journal.identity), trials)
 
 
 def _step(campaign: Campaign) -> CampaignTrial:
@@ -194,38 +222,73 @@ def _check(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     reason = objection(trial.x, campaign.dimensions)
     if reason is not None:
         return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": reason})
-    facts = {"predicted_y": campaign.proposals.predict(trial.x)}
+    plan = campaign.gate.plan(trial_id(campaign.journal, trial), trial.x)
+    if plan.get("objection"):
+        return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": plan["objection"]})
+    facts = {"predicted_y": campaign.proposals.predict(trial.x), "plan": dict(plan)}
     return record(campaign.journal, trial, State.CHECKED, "limits", facts)
 
 
 def _approve_by_policy(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
-    return approve(campaign.journal, trial, "policy: rehearsal")
+    return approve(campaign.journal, trial, "policy: rehearsal", {})
 
 
-def approve(journal: Journal, trial: CampaignTrial, who: str) -> CampaignTrial:
+def approve(journal: Journal, trial: CampaignTrial, who: str, bounds: Mapping[str, Any]) -> CampaignTrial:
     """Lets one trial onto the robot; the approval names the bytes of its controller.
 
     Args:
         journal: of the campaign.
         trial: as the caller has seen it.
         who: approves.
+        bounds: what else the approval is bound to: `limits`, a SHA-256, and `until`, a moment in UTC.
 
     Returns:
         What the trial became.
     """
-    return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256})
+    return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256, **bounds})
+
+
+def _lapse(campaign: Campaign, trial: CampaignTrial) -> str:
+    """Why an approval no longer holds; "" while it does."""
+    [*_, last] = (event for event in campaign.journal.events() if event.trial == trial.number)
+    bounds = json.loads(last.body)
+    if bounds.get("until") and utc_now() >= datetime.fromisoformat(bounds["until"]):
+        return f"the approval of {last.who} held until {bounds['until']}"
+    now = campaign.gate.approval()
+    if bounds.get("limits", now["limits"]) != now["limits"]:
+        return f"the robot's limits have changed since the approval of {last.who}"
+    if last.at < now["cleared"]:
+        return f"the robot was stopped since the approval of {last.who}"
+    return ""
 
 
 def _perform(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     """Moves the robot once; what the driver declares a fault is failed, all else that breaks is unknown."""
-    journal = campaign.journal
+    journal, name = campaign.journal, trial_id(campaign.journal, trial)
+    lapse = _lapse(campaign, trial)
+    if lapse:
+        return record(journal, trial, State.CHECKED, "executor", {"reason": lapse})
     granted = record(journal, trial, State.GRANTED, "executor", campaign.process)
+    campaign.gate.grant(journal.name, name, journal.events()[-1].hash)
     running = record(journal, granted, State.RUNNING, "executor", campaign.process)
     try:
-        measured = campaign.robot.run(trial_id(journal, trial), running.x)
+        measured = campaign.robot.run(name, running.x)
+    except RobotStopped as stopped:
+        return record(journal, running, State.ABORTED, "executor", {"fault": str(stopped)})
+    except RobotBroke as broke:
+        return _leave_open(campaign, running, str(broke))
     except RobotFault as fault:
         return record(journal, running, State.FAILED, "executor", {"fault": str(fault)})
+    except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
+        return _leave_open(campaign, running, f"the driver failed: {describe(error)}")
     return record(journal, running, State.MEASURED, "executor", asdict(measured))
+
+
+def _leave_open(campaign: Campaign, running: CampaignTrial, cause: str) -> CampaignTrial:
+    """Nobody knows what the robot did: a person will say."""
+    motion = campaign.gate.motion(trial_id(campaign.journal, running))
+    facts = {"ledger": asdict(motion), "found_by": campaign.process, "cause": cause}
+    return record(campaign.journal, running, State.UNKNOWN, "executor", facts)
 
 
 _STEPS: Mapping[State, Callable[[Campaign, CampaignTrial], CampaignTrial]] = {

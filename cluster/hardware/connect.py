@@ -150,9 +150,14 @@ def _no_place(others: list[str]) -> str:
             f"the robot's machine is taken by {', '.join(others)}; wait until that campaign has ended or, if "
             "its command was killed, repeat that command, which ends what it left behind"
         )
+    if ray.available_resources().get(RESOURCE, 0.0) >= 1.0:
+        return (
+            f"no campaign and no other work holds the resource {RESOURCE!r}: Ray is slow to start a process "
+            "on the robot's machine, which may be busy or short of memory (see its Ray logs)"
+        )
     return (
-        "the process at the robot does not start, and no other campaign is there; other work holds the "
-        f"resource {RESOURCE!r} (see ray status), or the robot's machine is too busy (see its Ray logs)"
+        "no other campaign is there: either Ray is slow to start a process on the robot's machine, which "
+        f"may be busy (see its Ray logs), or other work holds the resource {RESOURCE!r} (see ray status)"
     )
 
 

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from itertools import takewhile
 from math import inf
 from typing import Any
 
@@ -16,13 +17,17 @@ from cluster.hardware import journal, operator
 from cluster.hardware.actor import actor_options
 from cluster.hardware.connect import LEAVE_SECONDS, POLL_SECONDS, Say, at_the_robot, require_robot_host
 from cluster.hardware.plan import CampaignPlan
-from cluster.hardware.states import State
+from cluster.hardware.states import TERMINAL, State
 from cluster.hardware.status import Phase, Status
 from cluster.runtime.session import Session
 from cluster.tracking import Run, Tracker
 from workers.hardware import robots
 
-BROKEN = frozenset({State.FAILED, State.REJECTED})
+BROKEN = frozenset({State.FAILED, State.ABORTED})
+MOST_REJECTED = 20
+"""So many trials in a row that the robot's limits reject say that limits and controllers do not fit."""
+WAITS = frozenset({Phase.AWAITS_APPROVAL, Phase.RESTS})
+"""In these nobody has to do anything at the command."""
 
 Report = Callable[[Status], None]
 
@@ -68,30 +73,55 @@ def _carry_out(actor: Any, plan: CampaignPlan, first: Status, run: Run, report: 
     """Asks for one trial after the other, and records each."""
     _record(run, first, 0)
     report(first)
-    before = first
+    before, told = first, (Phase.READY, -1)
     while before.phase is not Phase.COMPLETE:
-        if before.phase is Phase.AWAITS_RESOLUTION:
+        if before.phase in (Phase.AWAITS_RESOLUTION, Phase.STOPPED):
             raise UserError(before.advice)
-        if before.phase is Phase.AWAITS_APPROVAL:
+        if before.phase in WAITS:
+            told = _tell_once(before, told, say)
             time.sleep(POLL_SECONDS)
-        now = _answer(actor.advance.remote(plan), say)
-        if now != before:
+        now = _answer(actor.advance.remote(plan), before, say)
+        if now.trials != before.trials:
             _record(run, now, before.measured)
             report(now)
-        if now.trials[-1].state in BROKEN:
+        if now.trials and now.trials[-1].state in BROKEN:
             raise UserError(now.advice)
+        if _rejected_in_a_row(now) >= MOST_REJECTED:
+            raise UserError(f"{MOST_REJECTED} controllers in a row were rejected; {now.advice}")
         before = now
     return before
 
 
-def _answer(reference: Any, say: Say) -> Status:
-    """Waits for a trial; Ctrl-C lets it end, a second one leaves it to its fate."""
+def _tell_once(now: Status, told: tuple[Phase, int], say: Say) -> tuple[Phase, int]:
+    """Say what the command waits for, once for each trial."""
+    wait = (now.phase, len(now.trials))
+    if wait != told:
+        say(now.advice)
+    return wait
+
+
+def _rejected_in_a_row(now: Status) -> int:
+    states = [trial.state for trial in now.trials]
+    return len(list(takewhile(lambda state: state is State.REJECTED, reversed(states))))
+
+
+def _answer(reference: Any, before: Status, say: Say) -> Status:
+    """Waits for a trial; Ctrl-C lets it end, a second one cuts it."""
     try:
         return ray.get(reference)
     except KeyboardInterrupt:
-        say("stopping after the trial under way; press Ctrl-C again to leave at once")
+        say("stopping after the trial under way; press Ctrl-C again to cut it")
+    try:
         ray.get(reference)
-        raise
+    except KeyboardInterrupt:
+        number = next((trial.number for trial in before.trials if trial.state not in TERMINAL), None)
+        what = f"trial {number}" if number is not None else "the trial"
+        say(
+            f"{what} was cut where it was: its host brings the robot to rest. If it had begun to move the "
+            f"robot, a person must say what became of it: repeat the start command, or see svaedc hardware "
+            f"status {before.folder}"
+        )
+    raise KeyboardInterrupt
 
 
 def _record(run: Run, status: Status, recorded: int) -> None:

@@ -1,54 +1,134 @@
-"""What a person does to a campaign in a folder: look, approve, resolve, export."""
+"""What a person does to a campaign in a folder: look, approve, reject, resolve, amend, export."""
 
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import asdict
+from datetime import timedelta
 from pathlib import Path
 
-from cluster.errors import UsageError
+from cluster.errors import UsageError, UserError
 from cluster.hardware import campaign, journal, lock
 from cluster.hardware.events import CampaignTrial, canonical, utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
+from cluster.hardware.robot import residence
 from cluster.hardware.states import State
 from cluster.hardware.status import Status
 from cluster.hardware.status import status as look
-from workers.hardware import ledger
-from workers.hardware.ledger import MotionLedger
+from workers import setups
+from workers.hardware import robots
+from workers.hardware.gate import Gate
 
 OUTCOMES = (State.MEASURED, State.FAILED, State.ABORTED)
+VALID_MINUTES = 60.0
+"""An approval holds so long, unless a person says otherwise."""
 
 
 def status(folder: Path) -> Status:
-    """How the campaign in a folder stands.
+    """How the campaign in a folder stands; nothing is written, so that a copy on read-only media will do.
 
     Raises:
         JournalError: when there is none, or its journal is damaged.
     """
-    with _open(folder) as opened:
-        return look(opened, lock.holder(folder))
+    with _looking(folder) as opened, residence.robot_errors():
+        return look(opened, lock.holder(folder), _gate(folder, opened))
 
 
-def approve(folder: Path, trial: int, who: str) -> CampaignTrial:
-    """Lets a checked trial onto the robot.
+def approve(folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES) -> CampaignTrial:
+    """Lets a checked trial onto the robot; bound to the controller, to the robot's limits, and for a while.
 
     Args:
         folder: of the campaign.
         trial: its number.
         who: approves; recorded for good.
+        minutes: that the approval holds.
 
     Returns:
         The approved trial.
 
     Raises:
+        UsageError: nobody is named, or the time is none.
         IllegalTransition: when the trial does not wait for approval.
     """
+    if not 0 < minutes < float("inf"):
+        raise UsageError(f"an approval must hold for some minutes, got {minutes}; give --minutes NUMBER")
+    with _open(folder) as opened, residence.robot_errors():
+        until = utc_now() + timedelta(minutes=minutes)
+        bounds = {"limits": _gate(folder, opened).approval()["limits"], "until": until.isoformat()}
+        return campaign.approve(opened, opened.trial(trial), _require_name(who), bounds)
+
+
+def withdraw(folder: Path, trial: int, who: str) -> CampaignTrial:
+    """Takes an approval back, as long as the trial was not granted.
+
+    Args:
+        folder: of the campaign.
+        trial: its number.
+        who: decides; recorded for good.
+
+    Returns:
+        The trial, which waits for approval again.
+
+    Raises:
+        IllegalTransition: when the trial is not approved, or was granted already.
+    """
     with _open(folder) as opened:
-        return campaign.approve(opened, opened.trial(trial), _require_name(who))
+        facts = {"reason": "the approval was withdrawn"}
+        return campaign.record(opened, opened.trial(trial), State.CHECKED, _require_name(who), facts)
+
+
+def reject(folder: Path, trial: int, who: str, note: str) -> CampaignTrial:
+    """Keeps a trial off the robot; neither its controller nor one near it is ever suggested again.
+
+    Args:
+        folder: of the campaign.
+        trial: its number.
+        who: decides; recorded for good.
+        note: why; recorded for good.
+
+    Returns:
+        The rejected trial.
+
+    Raises:
+        UsageError: nobody is named, or nothing is noted.
+        IllegalTransition: when the trial was granted already, or has ended.
+    """
+    if not note.strip():
+        raise UsageError("a rejection needs a note that says why, got nothing; give --note TEXT")
+    with _open(folder) as opened:
+        facts = {"reason": note.strip()}
+        return campaign.record(opened, opened.trial(trial), State.REJECTED, _require_name(who), facts)
+
+
+def adopt(folder: Path, who: str, home: Path | None) -> None:
+    """Vouches for a campaign that moved the robot under another home.
+
+    Args:
+        folder: of the campaign.
+        who: vouches; recorded for good.
+        home: of the robot from now on; None for the usual one.
+
+    Raises:
+        UserError: when the robot's home cannot be written.
+    """
+    name = _require_name(who)
+    with _open(folder) as opened, residence.robot_errors():
+        found = residence.enter(folder, opened.identity.robot, home)
+        Gate(found, residence.limits_of(found, simulated=True), folder).adopt(opened.name, name)
 
 
 def resolve(
-    folder: Path, trial: int, outcome: str, who: str, note: str, f: float | None, y: float | None
+    folder: Path,
+    trial: int,
+    outcome: str,
+    who: str,
+    note: str,
+    f: float | None,
+    y: float | None,
+    confirmed: float | None = None,
 ) -> CampaignTrial:
     """Says what became of an unknown trial, or amends a measured one; the old value stays in the events.
 
@@ -60,6 +140,7 @@ def resolve(
         note: why; recorded for good.
         f: objective of a measured trial; None otherwise.
         y: badness in [0, 1] of a measured trial; None otherwise.
+        confirmed: the objective once more, where it lies outside what the setup says is possible.
 
     Returns:
         The trial with its outcome.
@@ -72,7 +153,37 @@ def resolve(
     new, body = _resolution(outcome, note, f, y)
     close_abandoned(folder, patience=0.0)
     with _open(folder) as opened:
+        _require_possible(opened, f, confirmed)
         return campaign.record(opened, opened.trial(trial), new, _require_name(who), body)
+
+
+def amend(
+    folder: Path, trial: int, who: str, note: str, f: float, y: float, confirmed: float | None = None
+) -> CampaignTrial:
+    """Corrects what a trial measured; the old value stays in the events.
+
+    Args:
+        folder: of the campaign.
+        trial: its number.
+        who: decides; recorded for good.
+        note: why; recorded for good.
+        f: objective.
+        y: badness in [0, 1].
+        confirmed: the objective once more, where it lies outside what the setup says is possible.
+
+    Returns:
+        The trial as amended.
+
+    Raises:
+        UsageError: when an argument is missing or out of its range, or the trial was not measured.
+    """
+    with _looking(folder) as opened:
+        state = opened.trial(trial).state
+    if state is not State.MEASURED:
+        raise UsageError(
+            f"only a measured trial can be amended, trial {trial} is {state}; an unknown one is resolved"
+        )
+    return resolve(folder, trial, State.MEASURED, who, note, f, y, confirmed)
 
 
 def close_abandoned(folder: Path, patience: float) -> None:
@@ -85,19 +196,19 @@ def close_abandoned(folder: Path, patience: float) -> None:
     Raises:
         FolderTaken: when it is alive.
     """
-    with _open(folder) as opened:
+    with _open(folder) as opened, residence.robot_errors():
         running = [trial for trial in opened.trials() if trial.state is State.RUNNING]
         if running:
             with FolderLock(folder, patience):
                 for trial in running:
-                    motion = MotionLedger(folder / ledger.FILE).motion(campaign.trial_id(opened, trial))
+                    motion = _gate(folder, opened).motion(campaign.trial_id(opened, trial))
                     facts = {"ledger": asdict(motion), "found_by": asdict(Process.current())}
                     campaign.record(opened, trial, State.UNKNOWN, "recovery", facts)
 
 
 def export(folder: Path) -> Iterator[str]:
-    """The journal as JSON lines: the campaign first, then every event, oldest first."""
-    with _open(folder) as opened:
+    """The journal as JSON lines: the campaign first, then every event, oldest first; nothing is written."""
+    with _looking(folder) as opened:
         yield canonical({"campaign": opened.name, **opened.identity.facts()})
         for event in opened.events():
             yield canonical(asdict(event))
@@ -107,6 +218,49 @@ def export(folder: Path) -> Iterator[str]:
 def _open(folder: Path) -> Iterator[Journal]:
     with closing(Journal(folder / journal.FILE, utc_now)) as opened:
         yield opened
+
+
+@contextmanager
+def _looking(folder: Path) -> Iterator[Journal]:
+    """The journal, also where nothing can be written: SQLite needs files beside it, even to read."""
+    if os.access(folder, os.W_OK) or not folder.is_dir():
+        with _open(folder) as opened:
+            yield opened
+        return
+    with tempfile.TemporaryDirectory(prefix="svaedc-") as name:
+        try:
+            for part in folder.glob(f"{journal.FILE}*"):
+                shutil.copyfile(part, Path(name) / part.name)
+        except OSError as error:
+            raise UserError(f"cannot read the journal in {folder}: {error.strerror}") from error
+        with _open(Path(name)) as opened:
+            opened.path = folder / journal.FILE
+            yield opened
+
+
+def _gate(folder: Path, opened: Journal) -> Gate:
+    """What the robot's home says, for somebody who only looks."""
+    home = residence.home_of_campaign(folder, opened.identity.robot)
+    try:
+        simulated = robots.find(opened.identity.robot).simulated
+    except LookupError:  # its module is not here, and its home may be
+        simulated = True
+    return Gate(home, residence.limits_of(home, simulated=simulated), folder)
+
+
+def _require_possible(opened: Journal, f: float | None, confirmed: float | None) -> None:
+    """Refuse an objective that the setup rules out, unless it is typed twice."""
+    if f is None or confirmed == f:
+        return
+    try:
+        low, high = setups.load(opened.identity.setup).objective_limits
+    except LookupError:  # its module is not here, so nobody knows
+        return
+    if not low <= f <= high:
+        raise UsageError(
+            f"the objective of {opened.identity.setup} must lie in [{low:g}, {high:g}], got {f:g}, and one "
+            f"outside misleads every later suggestion; if it is meant, type it again with --confirm {f:g}"
+        )
 
 
 def _require_name(who: str) -> str:

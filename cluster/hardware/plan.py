@@ -15,7 +15,7 @@ from cluster.optimization.candidates import require_usable
 from cluster.optimization.factory import DRAWS
 from workers.dataset.shards import sha256
 from workers.hardware import robots
-from workers.hardware.rehearsal import LONGEST_PACE_SECONDS
+from workers.hardware.robots import LONGEST_PACE_SECONDS
 from workers.setups import SETUPS, registry
 
 
@@ -29,6 +29,7 @@ class CampaignPlan:
         model: checkpoint, kept absolute; None for a method without one.
         pace: least duration of a trial on a rehearsal robot, in s, at most a day.
         candidates: table of simulated ones, kept absolute; None where the campaign draws its own.
+        home: of the robot, kept absolute; None for its usual one.
     """
 
     identity: CampaignIdentity
@@ -36,13 +37,14 @@ class CampaignPlan:
     model: Path | None
     pace: float
     candidates: Path | None = None
+    home: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.pace <= LONGEST_PACE_SECONDS:
             raise UsageError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {self.pace}")
         # The process that carries it out has a working directory of its own.
         object.__setattr__(self, "folder", self.folder.absolute())
-        for field in ("model", "candidates"):
+        for field in ("model", "candidates", "home"):
             path = getattr(self, field)
             object.__setattr__(self, field, path and path.absolute())
 

@@ -26,7 +26,7 @@ LEGAL: Mapping[State | None, frozenset[State]] = MappingProxyType(
         None: frozenset({State.PROPOSED}),
         State.PROPOSED: frozenset({State.CHECKED, State.REJECTED}),
         State.CHECKED: frozenset({State.APPROVED, State.REJECTED}),
-        State.APPROVED: frozenset({State.GRANTED}),
+        State.APPROVED: frozenset({State.GRANTED, State.CHECKED, State.REJECTED}),
         State.GRANTED: frozenset({State.APPROVED, State.RUNNING, State.UNKNOWN}),
         State.RUNNING: frozenset({State.MEASURED, State.FAILED, State.ABORTED, State.UNKNOWN}),
         State.UNKNOWN: frozenset({State.MEASURED, State.FAILED, State.ABORTED}),

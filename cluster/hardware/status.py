@@ -1,11 +1,14 @@
 """How a campaign stands, for a person: its trials, what it needs next, and the command that gives it that."""
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
-from cluster.hardware.events import CampaignTrial
+from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import Process
@@ -14,7 +17,7 @@ from cluster.hardware.states import TERMINAL, Approval, State
 RANDOM_TRIALS = 2
 """So many random trials are measured before the first suggestion, as in the paper's hardware runs."""
 
-REASONS = {State.FAILED: "fault", State.REJECTED: "reason"}
+REASONS = {State.FAILED: "fault", State.REJECTED: "reason", State.ABORTED: "fault"}
 
 
 class Phase(StrEnum):
@@ -24,7 +27,23 @@ class Phase(StrEnum):
     RUNNING = "running"
     AWAITS_APPROVAL = "awaits approval"
     AWAITS_RESOLUTION = "awaits resolution"
+    STOPPED = "stopped"
+    RESTS = "rests"
     COMPLETE = "complete"
+
+
+@runtime_checkable
+class RobotGate(Protocol):
+    """What its robot says of a campaign; see `workers.hardware.gate.Gate`."""
+
+    @property
+    def stopped(self) -> str:
+        """Why the robot is stopped; "" when it is not."""
+        ...
+
+    def rest_seconds(self, now: datetime) -> float:
+        """How long the robot must rest before its next trial."""
+        ...
 
 
 def phase_of(trials: tuple[CampaignTrial, ...], identity: CampaignIdentity) -> Phase:
@@ -69,6 +88,7 @@ class Status:
         phase: what it needs next.
         trials: by number.
         advice: a sentence for the person in charge; "" when nothing is asked of them.
+        folder: of the campaign.
     """
 
     name: str
@@ -76,6 +96,7 @@ class Status:
     phase: Phase
     trials: tuple[CampaignTrial, ...]
     advice: str
+    folder: Path
 
     @property
     def planned(self) -> int:
@@ -121,33 +142,73 @@ class Status:
         }
 
 
-def status(journal: Journal, executor: Process | None) -> Status:
+def status(journal: Journal, executor: Process | None, gate: RobotGate | None = None) -> Status:
     """Looks at a campaign.
 
     Args:
         journal: of the campaign.
         executor: the live process that executes it; None when there is none.
+        gate: before its robot; None where that is not known.
 
     Returns:
         Phase, trials and advice.
     """
     trials = journal.trials()
     now = phase_of(trials, journal.identity)
-    return Status(journal.name, journal.identity, now, trials, _advice(journal, trials, now, executor))
+    if gate is not None:
+        now = phase_at(gate, now, trials)
+    advice = _advice(journal, trials, now, executor, gate)
+    return Status(journal.name, journal.identity, now, trials, advice, journal.path.parent)
 
 
-def _advice(journal: Journal, trials: tuple[CampaignTrial, ...], now: Phase, executor: Process | None) -> str:
-    folder = journal.path.parent
+def phase_at(gate: RobotGate, phase: Phase, trials: Sequence[CampaignTrial]) -> Phase:
+    """Tell what a campaign needs next where its robot has a say in it.
+
+    Args:
+        gate: before its robot.
+        phase: as its trials have it.
+        trials: of the campaign, by number.
+
+    Returns:
+        STOPPED or RESTS where the next step would move the robot, and it is stopped or must rest.
+    """
+    if phase is Phase.READY and any(trial.state is State.APPROVED for trial in trials):
+        if gate.stopped:
+            return Phase.STOPPED
+        if gate.rest_seconds(utc_now()) > 0:
+            return Phase.RESTS
+    return phase
+
+
+def _advice(
+    journal: Journal,
+    trials: tuple[CampaignTrial, ...],
+    now: Phase,
+    executor: Process | None,
+    gate: RobotGate | None,
+) -> str:
+    folder, robot = journal.path.parent, journal.identity.robot
     number = next((trial.number for trial in trials if trial.state not in TERMINAL), None)
     if now is Phase.AWAITS_RESOLUTION:
         return (
-            f"trial {number} may have moved the robot when the program died{_on_record(journal)}. When the "
+            f"trial {number} may have moved the robot{_on_record(journal)}. When the "
             f"robot stands still and is reset: svaedc hardware resolve {folder} --trial {number} "
             "--outcome measured|failed|aborted --who NAME --note TEXT (--f and --y for measured); "
             "then repeat the start command"
         )
+    if gate is not None and (now is Phase.STOPPED or gate.stopped):
+        return (
+            f"the robot was {gate.stopped}. When it stands still and is reset: svaedc hardware clear {robot} "
+            "--who NAME --note TEXT; then repeat the start command"
+        )
+    if gate is not None and now is Phase.RESTS:
+        return f"the robot rests {gate.rest_seconds(utc_now()):.0f} s more, as its limits say"
     if now is Phase.AWAITS_APPROVAL:
-        return f"trial {number} waits: svaedc hardware approve {folder} --trial {number} --who NAME"
+        since = _since(journal, trials[-1].number)
+        return (
+            f"trial {number} waits for a person since {since}: svaedc hardware approve {folder} "
+            f"--trial {number} --who NAME (or reject, with --note TEXT)"
+        )
     if trials and trials[-1].state in REASONS:
         last = trials[-1].number
         return f"trial {last} was {_reason(journal, last)}; see to it, then repeat the start command"
@@ -167,10 +228,23 @@ def _reason(journal: Journal, number: int) -> str:
     return f"{last.new}: {body.get(REASONS[last.new], body.get('note'))}"
 
 
+def _since(journal: Journal, number: int) -> str:
+    """When a trial came to where it stands."""
+    last = next(event for event in reversed(journal.events()) if event.trial == number)
+    return last.at.partition(".")[0].replace("T", " ") + " UTC"
+
+
 def _on_record(journal: Journal) -> str:
     """What the robot's ledger knew of the unknown trial when it was found."""
     found = next(event for event in reversed(journal.events()) if event.new is State.UNKNOWN)
-    ledger = json.loads(found.body)["ledger"]
-    if ledger["measurement"] is None:
-        return " (its ledger: started, never ended)" if ledger["started"] else " (its ledger: never started)"
-    return f" (its ledger: ended with f {ledger['measurement']['f']}, y {ledger['measurement']['y']})"
+    body = json.loads(found.body)
+    cause = f": {body['cause']}" if body.get("cause") else " when the program died"
+    return f"{cause} ({_ledger_says(body['ledger'])})"
+
+
+def _ledger_says(ledger: Mapping[str, Any]) -> str:
+    if ledger["measurement"] is not None:
+        return f"its ledger: ended with f {ledger['measurement']['f']}, y {ledger['measurement']['y']}"
+    if ledger["started"]:
+        return "its ledger: started, never ended"
+    return "its ledger: never started" if ledger.get("certain", True) else "its ledger was cut off"

@@ -1,58 +1,82 @@
-"""What every driver of a robot must obey; the one that the documentation shows how to write is among them."""
+"""What every robot must obey behind its host; the one that the documentation shows how to drive is one."""
 
 import hashlib
+import os
 import re
+import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from workers import setups
-from workers.environments.environment import Observed
 from workers.hardware import robots
-from workers.hardware.driver import Measurement, Motion, RobotDriver, RobotFault
-from workers.hardware.ledger import FILE, MotionLedger
+from workers.hardware.driver import Measurement, Motion, RobotDriver, RobotFault, RobotStopped
 from workers.hardware.robots import Robot
+from workers.host import stop
+from workers.host.home import RobotHome
+from workers.host.latch import Stop
+from workers.host.limits import Limits
 from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "drivers.md"
 REHEARSALS = [*sorted(robots.ROBOTS.keys() & setups.SETUPS.keys()), "rehearsal:quadratic-30d"]
 """Robots that are setups too are simulated; a test that connected another would move it."""
-
 SEED = 3
-PUSHED = 0.125
-"""Metres by which the arm that moves nothing says it has pushed the first roll."""
+
+MAKER = '''
+"""Stands in for the maker's module: an arm that moves nothing."""
+
+class BusError(Exception):
+    pass
+
+class Bus:
+    def __init__(self, port):
+        self.port, self.angles, self.writes = port, [], 0
+
+    def write(self, angles):
+        self.angles, self.writes = list(angles), self.writes + 1
+        if self.port == "hot" and self.writes == 20:
+            raise BusError("joint 3 is hot")
+
+    def read(self):
+        return self.angles
+
+    def halt(self):
+        print("halted")
+
+    def close(self):
+        print("closed")
+'''
 
 
-def still(_x, _stopped):
-    """Plays no motion: what is seen is an upright roll that ends where a good push would leave it."""
-    setup = setups.load("franka")
-    task = setup.task
-    xi = np.zeros((len(setup.observation), setup.horizon), np.float32)
-    for number, (at_x, at_y) in enumerate(task.starts):
-        roll = xi[task.channel + 9 * number :]
-        roll[0], roll[1], roll[3], roll[7] = at_x, at_y, 1.0, 1.0
-    xi[task.channel + 1, -1] += task.direction * PUSHED
-    middle = np.array([np.mean(task.table_x), np.mean(task.table_y), 0.2])
-    hand = np.repeat(middle[:, None], setup.horizon, axis=1)
-    touching = np.zeros(setup.horizon, bool)
-    return Observed(xi, {"hand_position": hand, "table_contact": touching})
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """A folder with the documented driver and its maker's module, and a Python without any library."""
+    folder = tmp_path_factory.mktemp("lab")
+    driver, _ = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (folder / "lab_arm.py").write_text(driver)
+    (folder / "maker.py").write_text(MAKER)
+    bare = folder / "python"
+    bare.write_text(f'#!/bin/sh\ncd {folder} && exec {sys.executable} -S -E "$@"\n')
+    bare.chmod(0o700)
+    return folder
 
 
-def documented(play) -> Robot:
-    """The robot of the page, whose two blocks are executed as they stand there."""
-    section = PAGE.read_text().partition("## A driver for a real robot")[2].partition("\n## ")[0]
-    module, entry = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    namespace = {"Robot": Robot, "play": play}
-    exec(module, namespace)
-    return eval(entry, namespace)
+def documented(lab, port="/dev/ttyUSB0") -> Robot:
+    """The robot of the page, in an environment of its own."""
+    _, entry = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    names: dict = {}
+    exec(entry.replace("/opt/lab/bin/python", os.fspath(lab / "python")).replace("/dev/ttyUSB0", port), names)
+    return names["ARM"]
 
 
 @pytest.fixture(scope="module", params=[*REHEARSALS, "lab-arm"])
-def robot(request):
-    return robots.find(request.param) if request.param in REHEARSALS else documented(still)
+def robot(request, lab):
+    return robots.find(request.param) if request.param in REHEARSALS else documented(lab)
 
 
 @pytest.fixture(scope="module")
@@ -60,19 +84,38 @@ def x(robot):
     return generator(0, Stream.CONTROLLER, 0).random(setups.load(robot.setup).dimensions)
 
 
+CONNECTED = []
+
+
+@pytest.fixture(autouse=True)
+def let_go():
+    """No host outlives its test."""
+    yield
+    while CONNECTED:
+        CONNECTED.pop().stop()
+
+
+def connected(robot, folder, limits=None):
+    home = RobotHome(folder / "home", robot.name).make()
+    CONNECTED.append(robot.connect(SEED, 0.0, home, Limits.read(limits or {}, "limits")))
+    return CONNECTED[-1]
+
+
 @pytest.fixture(scope="module")
 def ran(robot, x, tmp_path_factory):
     """The folder of a robot that has run the trial "a", and what it measured."""
     folder = tmp_path_factory.mktemp("ran")
-    return folder, robot.connect(SEED, 0.0, folder).run("a", x)
+    driver = connected(robot, folder)
+    return folder, driver.run("a", x)
 
 
 def motions(folder):
-    return [(entry["trial"], entry["event"]) for entry in MotionLedger(folder / FILE).entries()]
+    entries = RobotHome(folder / "home", "").ledger.entries()
+    return [(entry.facts["trial"], entry.event) for entry in entries if "trial" in entry.facts]
 
 
-def test_a_driver_has_the_name_and_the_setup_of_its_robot(robot, tmp_path):
-    driver = robot.connect(SEED, 0.0, tmp_path)
+def test_a_robot_behind_its_host_is_a_driver_with_its_name_and_setup(robot, tmp_path):
+    driver = connected(robot, tmp_path)
     assert isinstance(driver, RobotDriver)
     assert (driver.name, driver.setup) == (robot.name, robot.setup)
 
@@ -80,9 +123,10 @@ def test_a_driver_has_the_name_and_the_setup_of_its_robot(robot, tmp_path):
 def test_the_robot_knows_what_became_of_a_trial_whatever_process_asks(robot, ran):
     folder, measured = ran
     assert isinstance(measured, Measurement)
-    driver = robot.connect(SEED, 0.0, folder)
-    assert driver.motion("a") == Motion(started=True, measurement=measured)
-    assert driver.motion("b") == Motion(started=False, measurement=None)
+    known = connected(robot, folder).motion("a")
+    assert known.started
+    assert (known.measurement.f, known.measurement.evidence) == (measured.f, measured.evidence)
+    assert connected(robot, folder).motion("b") == Motion(started=False, measurement=None)
 
 
 @pytest.mark.parametrize("robot", REHEARSALS, indirect=True, scope="module")
@@ -97,63 +141,63 @@ def test_a_rehearsal_moves_as_the_setup_of_its_own_name(robot, x, ran):
 
 
 def test_no_trial_moves_the_robot_twice_even_in_another_process(robot, x, ran):
-    with pytest.raises(RuntimeError, match="trial a has already moved the robot"):
-        robot.connect(SEED, 0.0, ran[0]).run("a", x)
+    driver = connected(robot, ran[0])
+    with pytest.raises(RobotStopped, match="trial a has already moved the robot"):
+        driver.run("a", x)
     assert motions(ran[0]) == [("a", "started"), ("a", "ended")]
 
 
 def test_a_stopped_robot_starts_nothing(robot, x, tmp_path):
-    driver = robot.connect(SEED, 0.0, tmp_path)
-    driver.stop()
-    with pytest.raises(RobotFault, match="trial a was not started"):
+    driver = connected(robot, tmp_path)
+    stop.request(driver.home, Stop("Ada", "it smells"))
+    with pytest.raises(RobotStopped, match=r"stopped by Ada at .*: it smells"):
         driver.run("a", x)
+    driver.stop()
     assert motions(tmp_path) == []
 
 
-@pytest.mark.parametrize("spoil", [lambda x: x + 2.0, lambda x: x[1:], lambda x: x * np.nan], ids=range(3))
+@pytest.mark.parametrize("spoil", [lambda x: x + 2.0, lambda x: x * np.nan], ids=range(2))
 def test_a_controller_outside_the_cube_moves_nothing(robot, x, spoil, tmp_path):
-    with pytest.raises(ValueError, match="x"):
-        robot.connect(SEED, 0.0, tmp_path).run("a", spoil(x))
+    driver = connected(robot, tmp_path)
+    with pytest.raises(RobotFault, match=r"every parameter of x must lie in \[0, 1\]"):
+        driver.run("a", spoil(x))
+    driver.stop()
     assert motions(tmp_path) == []
 
 
-def test_the_documented_driver_measures_what_the_task_says_of_the_motion(tmp_path):
-    robot = documented(still)
-    measured = robot.connect(SEED, 0.0, tmp_path).run("a", np.full(48, 0.5))
-    assert (robot.name, measured.y, measured.stop) == ("lab-arm", 0.0, "")
-    assert measured.f == pytest.approx(PUSHED, abs=1e-6)
+def test_the_documented_driver_plans_measures_and_lets_go_of_the_arm(lab, tmp_path):
+    driver, x = connected(documented(lab), tmp_path), np.full(48, 0.5)
+    planned = driver.check("a", x)
+    assert (planned.steps, planned.seconds, len(planned.channels)) == (200, 2.0, 6)
+    measured = driver.run("a", x)
+    assert (measured.f, measured.y, measured.stop) == (pytest.approx(6 * 0.25), 0.0, "")
+    assert measured.seconds >= 1.9
+    assert driver.hello["rest"] == {"stop": "hold", "kill": "hold", "silence": "hold", "disconnect": "drop"}
+    driver.stop()
+    assert driver.home.log.read_text().splitlines() == ["halted", "closed"]
 
 
-def test_the_documented_driver_writes_the_trial_down_before_it_moves(tmp_path):
-    seen = []
+def test_a_break_off_a_stop_and_a_limit_end_the_documented_driver_without_measurement(lab, tmp_path):
+    x = np.full(48, 0.5)
+    with pytest.raises(RobotFault, match="trial hot: the bus says joint 3 is hot"):
+        connected(documented(lab, "hot"), tmp_path).run("hot", x)
+    with pytest.raises(RobotFault, match=r"was not started: step 80: the position of joint1"):
+        connected(documented(lab), tmp_path, {"position": {"*": [0.0, 0.1]}}).run("limited", x)
+    driver, outcome = connected(documented(lab), tmp_path), []
+    driver.check("stopped", x)
 
-    def watched(x, stopped):
-        seen.extend(motions(tmp_path))
-        return still(x, stopped)
+    def run():
+        with pytest.raises(RobotStopped) as raised:
+            driver.run("stopped", x)
+        outcome.append(str(raised.value))
 
-    documented(watched).connect(SEED, 0.0, tmp_path).run("a", np.full(48, 0.5))
-    assert seen == [("a", "started")]
-
-
-def test_a_stop_and_a_break_off_of_the_documented_driver_are_faults_without_measurement(tmp_path):
-    def broken(_x, _stopped):
-        raise OSError("joint 3 is hot")
-
-    def waiting(x, stopped):
-        moving.set()
-        assert stopped.wait(timeout=60)
-        return still(x, stopped)
-
-    def stop():
-        assert moving.wait(timeout=60)
-        driver.stop()
-
-    with pytest.raises(RobotFault, match="trial a broke off: joint 3 is hot"):
-        documented(broken).connect(SEED, 0.0, tmp_path).run("a", np.full(48, 0.5))
-    moving, driver = threading.Event(), documented(waiting).connect(SEED, 0.0, tmp_path)
-    stopping = threading.Thread(target=stop)
-    stopping.start()
-    with pytest.raises(RobotFault, match="trial b was stopped before its end"):
-        driver.run("b", np.full(48, 0.5))
-    stopping.join()
-    assert motions(tmp_path) == [("a", "started"), ("b", "started")]
+    running = threading.Thread(target=run)
+    running.start()
+    while not driver.motion("stopped").started:
+        time.sleep(0.02)
+    assert stop.request(driver.home, Stop("Ada", "enough")).reached
+    running.join()
+    assert "stopped by Ada at" in outcome[0]
+    assert motions(tmp_path) == [
+        (name, event) for name in ("hot", "stopped") for event in ("started", "broken")
+    ]

@@ -96,7 +96,9 @@ def _parts(steps: Sequence[Step], printed: str) -> list[Done]:
 
 
 def _environment(home: Path) -> dict[str, str]:
-    kept = {key: value for key, value in os.environ.items() if key not in ("RAY_ADDRESS", "CI")}
+    kept = {
+        key: value for key, value in os.environ.items() if key not in ("RAY_ADDRESS", "CI", "XDG_STATE_HOME")
+    }
     path = f"{Path(sys.executable).parent}{os.pathsep}{kept['PATH']}"
     shown = {"COLUMNS": "110", "NO_COLOR": "1", "TERM": "dumb", "LC_ALL": "C.UTF-8"}
     return {**kept, **shown, "HOME": str(home), "PATH": path}

@@ -15,6 +15,14 @@ class RobotFault(RuntimeError):  # noqa: N818 - a fault is what roboticists call
     """The robot broke off a trial, stands still, and has no valid objective to report."""
 
 
+class RobotStopped(RobotFault):
+    """The trial was stopped, or not let begin; the robot is at rest, and nothing is to be learnt from it."""
+
+
+class RobotBroke(RobotFault):
+    """Nobody knows what the robot did: its driver failed, or its process died in motion."""
+
+
 @dataclass(frozen=True)
 class Measurement:
     """What one trial on a robot yielded.
@@ -51,10 +59,12 @@ class Motion:
     Attributes:
         started: whether a motion of the trial ever began.
         measurement: what it measured, if it ever came to its end.
+        certain: whether the ledger vouches for that; a line that was cut off may have been the trial's.
     """
 
     started: bool
     measurement: Measurement | None
+    certain: bool = True
 
 
 @runtime_checkable

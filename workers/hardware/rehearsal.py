@@ -1,86 +1,119 @@
 """The rehearsal robot: a simulated setup with hidden physics that stands in for the real one."""
 
 import hashlib
-import threading
-import time
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Final
 
 import numpy as np
-from jaxtyping import Float
 
-from workers.attempts import Attempts
-from workers.controllers.controller import unit_cube
-from workers.hardware import ledger
-from workers.hardware.driver import Measurement, Motion, RobotFault
-from workers.hardware.ledger import MotionLedger
+from workers import setups
+from workers.controllers.controller import PlanTimes
+from workers.environments.environment import Channel
+from workers.hardware.robots import GAP
+from workers.host.limits import HostChannel
+from workers.host.machine import Fault, Machine, Plan, Rest
 from workers.randomness import Stream, generator
-from workers.setups import Setup
+from workers.rollout import Steps
+from workers.user_code import describe
 
-GAP = "wide"
-"""The hidden physics is drawn from this one of the setup's gaps."""
-LONGEST_PACE_SECONDS = 86_400.0
-"""The pace is at most a day, for a clock cannot wait for just any number."""
+_KINDS: Final = {"rad": "position", "rad/s": "speed", "N·m": "torque", "m": "workspace"}
 
 
-class RehearsalRobot:
+class RehearsalMachine(Machine):
     """A setup whose physics is drawn once from the wide gap and never shown to the campaign.
 
     Args:
-        name: of the robot, as in the registry.
-        setup: what is simulated.
+        setup: name of the setup that models and methods know.
+        simulated: name of the one that moves; it may be another, which stands in for it.
         seed: of the campaign; the hidden physics follows from it alone.
-        pace: least duration of a trial in s, at most a day; 0 runs as fast as the simulation.
-        folder: where the ledger of physical starts lies.
-
-    Raises:
-        ValueError: when pace is negative, longer than a day, or no number.
     """
 
-    def __init__(self, name: str, setup: Setup, seed: int, pace: float, folder: Path) -> None:
-        if not 0.0 <= pace <= LONGEST_PACE_SECONDS:
-            raise ValueError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {pace}")
-        self.name = name
-        self.setup = setup.name
-        self._simulated = setup
-        self._physics = setup.gap(GAP).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
-        self._pace = pace
-        self._ledger = MotionLedger(folder / ledger.FILE)
-        self._stopped = threading.Event()
+    rest: ClassVar[Rest] = Rest(stop="hold", kill="hold", silence="hold", disconnect="hold")
 
-    def run(self, trial_id: str, x: Float[np.ndarray, " D"]) -> Measurement:
-        """Rolls x out once under the hidden physics; see `RobotDriver.run`.
+    def __init__(self, setup: str, simulated: str, seed: int) -> None:
+        self._setup = replace(setups.load(simulated), name=setup)
+        self._environment = self._setup.open()
+        self._physics = self._setup.gap(GAP).draw(generator(seed, Stream.HIDDEN_PHYSICS, 0))
+        self._steps: Steps | None = None
+        self.period = self._setup.control_step
+        self.channels = tuple(map(_host_channel, self._environment.action))
+
+    def plan(self, x: Sequence[float]) -> Plan:
+        """What the controller wants, as far as its kind can tell it; see `Machine.plan`.
 
         Args:
-            trial_id: never seen by this robot before.
-            x: the controller, [D], in [0, 1].
+            x: the controller, each parameter in [0, 1].
 
         Returns:
-            What the episode was worth, and how long it took with the pace.
+            One row for every step; none where the controller offers no plan.
+        """
+        channels, period = self._setup.controller.planned, self._setup.control_step
+        seconds = self._setup.horizon * period
+        if not channels:
+            return Plan((), period, (), seconds)
+        steps = np.arange(1, self._setup.horizon + 1)
+        times = PlanTimes(steps, self._setup.horizon, period)
+        [rows] = self._setup.controller.plans(np.array([x], np.float32), times)
+        return Plan(tuple(map(_host_channel, channels)), period, rows.T.tolist(), seconds)
+
+    def begin(self, x: Sequence[float]) -> None:
+        """Reset the simulation; see `Machine.begin`.
 
         Raises:
-            RobotFault: it was stopped, before the trial or during it, or the simulation's code raised.
+            Fault: the code of the setup failed.
         """
-        began = time.monotonic()
-        if self._stopped.is_set():
-            raise RobotFault(f"trial {trial_id} was not started: the robot has been stopped")
-        controller = unit_cube(x.astype(np.float32), self._simulated.dimensions)
-        self._ledger.start(trial_id, x)
-        with Attempts(self._simulated) as attempts:
-            episode = attempts.rollout(controller, self._physics)
-        if episode.failure is not None:
-            raise RobotFault(f"trial {trial_id} failed: {episode.failure.reason}")
-        if self._stopped.wait(max(0.0, self._pace - (time.monotonic() - began))):
-            raise RobotFault(f"trial {trial_id} was stopped before its end")
-        evidence = hashlib.sha256(episode.xi.tobytes()).hexdigest()
-        seconds = time.monotonic() - began
-        measurement = Measurement(float(episode.f), float(episode.y), episode.stop, seconds, evidence)
-        self._ledger.end(trial_id, measurement)
-        return measurement
+        with _faults():
+            self._steps = Steps(self._setup, self._environment, np.array(x, np.float32), self._physics)
+
+    def command(self, step: int) -> list[float] | None:
+        """See `Machine.command`."""
+        del step  # the episode counts its own
+        with _faults():
+            command = self._begun().command()
+            return None if command is None else [float(value) for value in command]
+
+    def send(self, command: Sequence[float]) -> None:
+        """One step of the simulation; see `Machine.send`."""
+        with _faults():
+            self._begun().apply(command)
 
     def stop(self) -> None:
-        """Ends the trial under way as a fault, and every later one before it starts."""
-        self._stopped.set()
+        """Nothing moves between two steps."""
 
-    def motion(self, trial_id: str) -> Motion:
-        """What the ledger of physical starts says of a trial."""
-        return self._ledger.motion(trial_id)
+    def end(self) -> dict[str, Any]:
+        """See `Machine.end`."""
+        with _faults():
+            episode = self._begun().episode()
+        if not np.isfinite(episode.f):
+            raise Fault("the simulation exploded")
+        return {
+            "f": float(episode.f),
+            "y": float(episode.y),
+            "stop": episode.stop,
+            "evidence": hashlib.sha256(episode.xi.tobytes()).hexdigest(),
+        }
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._environment.close()
+
+    def _begun(self) -> Steps:
+        if self._steps is None:
+            raise Fault("no controller was begun")
+        return self._steps
+
+
+class _faults:  # noqa: N801 - reads as a sentence after `with`
+    """A setup's code that fails is a fault: a simulation that broke off stands still."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, Exception) and not isinstance(error, Fault):
+            raise Fault(describe(error)) from error
+
+
+def _host_channel(channel: Channel) -> HostChannel:
+    return HostChannel(channel.name, _KINDS.get(channel.unit, ""), channel.unit)

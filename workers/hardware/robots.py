@@ -1,14 +1,15 @@
 """The robots known by name: rehearsals of setups, those of installed packages, and a user's own."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from workers import plug_ins, setups
-from workers.hardware.driver import RobotDriver
-from workers.hardware.rehearsal import GAP, RehearsalRobot
+from workers.hardware.hosted import HostedRobot, Machinery
+from workers.host.home import RobotHome
+from workers.host.limits import Limits
 from workers.plug_ins import Kind, Part
 from workers.user_modules import call
 
@@ -16,6 +17,11 @@ STAND_IN = "simulated stand-in"
 """These words stand wherever the result of one does, so that nobody takes it for a robot's."""
 REHEARSAL: Final = "rehearsal:"
 """This before the name of a setup names the rehearsal of it."""
+GAP = "wide"
+"""The hidden physics of a rehearsal is drawn from this one of its setup's gaps."""
+LONGEST_PACE_SECONDS = 86_400.0
+"""The pace is at most a day, for a clock cannot wait for just any number."""
+_REHEARSED: Final = "workers.hardware.rehearsal:RehearsalMachine"
 
 
 @dataclass(frozen=True)
@@ -25,14 +31,44 @@ class Robot:
     Attributes:
         name: under which it is asked for; what a user's own calls itself is replaced by that.
         setup: name of the setup it realises.
-        connect: (seed, pace in s, folder for its ledger) -> the driver.
+        machine: its driver, as `module:name` of a subclass of `workers.host.machine.Machine`.
+        python: interpreter of the environment that the driver is installed in.
+        settings: keyword arguments of the machine, plain values.
         simulated: whether it is a simulated stand-in, whose trials need nobody's approval.
     """
 
     name: str
     setup: str
-    connect: Callable[[int, float, Path], RobotDriver]
+    machine: str
+    python: str = sys.executable
+    settings: Mapping[str, Any] = field(default_factory=dict)
     simulated: bool = False
+
+    def connect(self, seed: int, pace: float, home: RobotHome, limits: Limits) -> HostedRobot:
+        """The robot behind its host, which starts when it is first asked something.
+
+        Args:
+            seed: of the campaign; the hidden physics of a stand-in follows from it alone.
+            pace: least duration of a stand-in's trial, in s, at most a day; 0 as fast as it simulates.
+            home: of the robot, which the caller holds.
+            limits: of the robot.
+
+        Returns:
+            The robot.
+
+        Raises:
+            ValueError: the pace is negative, longer than a day, or no number.
+        """
+        if not 0.0 <= pace <= LONGEST_PACE_SECONDS:
+            raise ValueError(f"pace must lie in [0, {LONGEST_PACE_SECONDS:.0f}] s, got {pace}")
+        settings = {**self.settings, "seed": seed} if self.simulated else self.settings
+        machinery = Machinery(self.machine, self.python, settings, self.simulated)
+        period = (
+            pace / setups.load(str(self.settings.get("simulated", self.setup))).horizon
+            if self.simulated
+            else None
+        )
+        return HostedRobot(self.name, self.setup, home, machinery, limits, period)
 
 
 def _rehearsal(name: str, setup: str, simulated: str) -> Robot:
@@ -43,11 +79,8 @@ def _rehearsal(name: str, setup: str, simulated: str) -> Robot:
         setup: what they know.
         simulated: the setup that moves; it may be another one, which stands in for it.
     """
-
-    def connect(seed: int, pace: float, folder: Path) -> RobotDriver:
-        return RehearsalRobot(name, replace(setups.load(simulated), name=setup), seed, pace, folder)
-
-    return Robot(name, setup, connect, simulated=True)
+    settings = {"setup": setup, "simulated": simulated}
+    return Robot(name, setup, _REHEARSED, settings=settings, simulated=True)
 
 
 ROBOTS: Mapping[str, Robot] = MappingProxyType(

@@ -124,9 +124,39 @@ class DeskProposals:
         return None
 
 
-def campaign_on(opened_journal: Journal, robot: DeskRobot, suggest=climb) -> Campaign:
+@dataclass
+class DeskGate:
+    """An open gate before the desk robot."""
+
+    robot: DeskRobot
+    stopped: str = ""
+    rest: float = 0.0
+    objection: str = ""
+    bounds: dict = field(default_factory=lambda: {"limits": "l" * 64, "cleared": ""})
+    granted: list[tuple[str, str, str]] = field(default_factory=list)
+
+    def rest_seconds(self, now: datetime) -> float:
+        assert now.tzinfo is UTC
+        return self.rest
+
+    def grant(self, campaign: str, trial_id: str, journal: str) -> None:
+        self.granted.append((campaign, trial_id, journal))
+
+    def motion(self, trial_id: str) -> Motion:
+        return self.robot.motion(trial_id)
+
+    def plan(self, trial_id: str, x: np.ndarray) -> dict:
+        return {"objection": self.objection, "seconds": float(len(trial_id) * len(x))}
+
+    def approval(self) -> dict[str, str]:
+        return self.bounds
+
+
+def campaign_on(opened_journal: Journal, robot: DeskRobot, suggest=climb, gate=None) -> Campaign:
     proposals = DeskProposals(suggest, opened_journal.identity.seed)
-    return Campaign(opened_journal, robot, proposals, DIMENSIONS, asdict(Process.current()), {"desk": "1"})
+    process = asdict(Process.current())
+    gate = gate or DeskGate(robot)
+    return Campaign(opened_journal, robot, gate, proposals, DIMENSIONS, process, {"desk": "1"})
 
 
 def carry_out(

@@ -9,10 +9,11 @@ import pytest
 
 from cluster.hardware import campaign, journal
 from cluster.hardware.states import Approval, State
-from cluster.hardware.status import Phase, measured_trials, phase_of, planned_trials
+from cluster.hardware.status import Phase, measured_trials, phase_of, planned_trials, status
 from tests.cluster.hardware.desk import (
     DIMENSIONS,
     IDENTITY,
+    DeskGate,
     DeskRobot,
     Fuse,
     campaign_on,
@@ -22,6 +23,7 @@ from tests.cluster.hardware.desk import (
     opened,
     starts,
 )
+from workers.hardware.driver import RobotBroke, RobotFault, RobotStopped
 from workers.randomness import Stream, generator
 
 
@@ -144,7 +146,7 @@ def test_an_operators_campaign_waits_for_approval_and_goes_on_after_it(tmp_path)
         assert carry_out(tmp_path, identity=identity)[0] is Phase.AWAITS_APPROVAL
         assert len(starts(tmp_path)) == number
         with closing(opened(tmp_path)) as book:
-            campaign.approve(book, book.trial(number), "operator: Ada")
+            campaign.approve(book, book.trial(number), "operator: Ada", {})
     assert carry_out(tmp_path, identity=identity)[0] is Phase.COMPLETE
 
 
@@ -170,17 +172,116 @@ def test_what_no_driver_declared_a_fault_leaves_the_trial_unknown(tmp_path, book
             super().run(trial_id, x)
             raise OSError("cable")
 
-    with pytest.raises(OSError, match="cable"):
-        campaign.advance(campaign_on(book, Broken(tmp_path, Fuse(-1))))
+    assert campaign.advance(campaign_on(book, Broken(tmp_path, Fuse(-1)))) is Phase.AWAITS_RESOLUTION
     assert campaign.advance(campaign_on(book, robot_in(tmp_path))) is Phase.AWAITS_RESOLUTION
     assert starts(tmp_path) == ["desk-1-000"]
+    advice = status(book, None).advice
+    assert "trial 0 may have moved the robot: the driver failed: OSError: cable, at " in advice
+    assert "its ledger: ended with f" in advice
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "advice"),
+    [
+        (
+            RobotStopped("trial desk-1-000: stopped by Ada"),
+            "aborted",
+            "trial 0 was aborted: trial desk-1-000: s",
+        ),
+        (
+            RobotBroke("its process is gone"),
+            "unknown",
+            "trial 0 may have moved the robot: its process is gone",
+        ),
+        (RobotFault("a motor is hot"), "failed", "trial 0 was failed: a motor is hot"),
+    ],
+)
+def test_what_a_robot_raises_decides_what_becomes_of_the_trial(tmp_path, book, error, state, advice):
+    class Raising(DeskRobot):
+        def run(self, trial_id, x):
+            self.ledger.start(trial_id, x)
+            raise error
+
+    campaign.advance(campaign_on(book, Raising(tmp_path, Fuse(-1))))
+    assert book.trial(0).state == state
+    assert status(book, None).advice.startswith(advice)
+    past = campaign.history(book.trials(), DIMENSIONS)
+    assert len(past.failed) == (state != "unknown")
+
+
+def test_the_ledger_is_told_which_journal_grants_before_anything_moves(tmp_path, book):
+    work = campaign_on(book, robot_in(tmp_path))
+    campaign.advance(work)
+    granted = next(event for event in book.events() if event.new is State.GRANTED)
+    assert work.gate.granted == [("desk-1", "desk-1-000", granted.hash)]
+
+
+def test_a_stopped_or_resting_robot_is_granted_nothing(tmp_path, book):
+    robot = robot_in(tmp_path)
+    for gate, phase, advice in (
+        (DeskGate(robot, stopped="stopped by Ada: it smells"), Phase.STOPPED, "svaedc hardware clear desk"),
+        (DeskGate(robot, rest=12.0), Phase.RESTS, "the robot rests 12 s more"),
+    ):
+        assert campaign.advance(campaign_on(book, robot, gate=gate)) is phase
+        assert book.trial(0).state is State.APPROVED
+        assert advice in status(book, None, gate).advice
+    assert starts(tmp_path) == []
+    assert campaign.advance(campaign_on(book, robot)) is Phase.READY
+    assert starts(tmp_path) == ["desk-1-000"]
+
+
+def test_a_plan_that_the_limits_reject_is_never_granted_and_another_controller_follows(tmp_path, book):
+    robot = robot_in(tmp_path)
+    campaign.advance(campaign_on(book, robot, gate=DeskGate(robot, objection="step 3: too fast")))
+    assert book.trial(0).state is State.REJECTED
+    assert "trial 0 was rejected: step 3: too fast" in status(book, None).advice
+    assert campaign.advance(campaign_on(book, robot)) is Phase.READY
+    assert starts(tmp_path) == ["desk-1-001"]
+    assert campaign.history(book.trials(), DIMENSIONS).failed.tobytes() == book.trial(0).x.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("bounds", "now", "reason"),
+    [
+        ({"until": "2026-01-01T00:00:00+00:00"}, {}, "the approval of operator: Ada held until 2026-01-01"),
+        ({"limits": "k" * 64}, {}, "the robot's limits have changed since the approval of operator: Ada"),
+        (
+            {},
+            {"cleared": "2999-01-01T00:00:00+00:00"},
+            "the robot was stopped since the approval of operator",
+        ),
+        ({"until": "2999-01-01T00:00:00+00:00", "limits": "l" * 64}, {}, ""),
+    ],
+)
+def test_an_approval_lapses_with_time_limits_and_stops(tmp_path, bounds, now, reason):
+    identity = replace(IDENTITY, approval=Approval.OPERATOR)
+    carry_out(tmp_path, identity=identity)
+    robot = robot_in(tmp_path)
+    with closing(opened(tmp_path)) as book:
+        campaign.approve(book, book.trial(0), "operator: Ada", bounds)
+        gate = DeskGate(robot, bounds={"limits": "l" * 64, "cleared": "", **now})
+        phase = campaign.advance(campaign_on(book, robot, gate=gate))
+        assert phase is (Phase.AWAITS_APPROVAL if reason else Phase.READY)
+        assert len(starts(tmp_path)) == (not reason)
+        assert reason in json.loads(book.events()[-1].body).get("reason", "")
+
+
+def test_a_ledger_that_was_cut_off_vouches_for_nothing(tmp_path, book):
+    class CutOff(DeskRobot):
+        def motion(self, trial_id):
+            return replace(super().motion(trial_id), certain=False)
+
+    work = granted_by_a_dead_process(book, CutOff(tmp_path, Fuse(-1)))
+    campaign.recover(work)
+    assert book.trial(0).state is State.UNKNOWN
+    assert "its ledger was cut off" in status(book, None).advice
 
 
 def test_a_trial_id_the_ledger_knows_does_not_move_the_robot_again(tmp_path, book):
     robot = robot_in(tmp_path)
     robot.ledger.start("desk-1-000", np.zeros(DIMENSIONS))
-    with pytest.raises(RuntimeError, match="already moved the robot"):
-        campaign.advance(campaign_on(book, robot))
+    assert campaign.advance(campaign_on(book, robot)) is Phase.AWAITS_RESOLUTION
+    assert "already moved the robot" in status(book, None).advice
     assert len(starts(tmp_path)) == 1
     assert campaign.advance(campaign_on(book, robot)) is Phase.AWAITS_RESOLUTION
 

@@ -18,11 +18,13 @@ from cluster.hardware import connect, lock, operator
 from cluster.hardware.actor import HardwareActor, actor_options
 from cluster.hardware.driver import start
 from cluster.hardware.plan import CampaignPlan, identify
+from cluster.hardware.robot.residence import home_of_campaign
 from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from cluster.runtime.session import Session
 from cluster.tracking import open_tracker
-from tests.cluster.hardware.desk import opened, starts
+from tests.cluster.hardware.desk import opened
+from workers.host.serve import STARTED
 
 ROOT = Path(__file__).parents[3]
 LONG_PACE_SECONDS = 600.0
@@ -58,6 +60,17 @@ def when(condition, act, seconds=120.0):
     thread = threading.Thread(target=watch, daemon=True)
     thread.start()
     return thread
+
+
+def starts(folder):
+    """Names of the campaign's trials that ever moved the robot, from its ledger."""
+    try:
+        name = operator.status(folder).name
+    except UserError:
+        return []
+    entries = home_of_campaign(folder, "franka-rehearsal").ledger.entries()
+    trials = [entry.facts["trial"] for entry in entries if entry.event == STARTED]
+    return [trial for trial in trials if trial.startswith(name)]
 
 
 def state_of(folder, number):

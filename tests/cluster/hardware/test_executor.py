@@ -6,10 +6,10 @@ from cluster.errors import UserError
 from cluster.hardware.executor import Executor
 from cluster.hardware.identity import IdentityMismatch
 from cluster.hardware.lock import FolderTaken
+from cluster.hardware.robot.residence import home_of_campaign
 from cluster.hardware.status import Phase
 from svaedc.bo import methods
 from tests.cluster.hardware.rehearsals import carried_out, plan_in
-from workers.hardware.ledger import MotionLedger
 
 
 @pytest.mark.parametrize("method", ["random", "se", "svae-dc"])
@@ -17,8 +17,9 @@ def test_a_rehearsal_campaign_runs_to_its_end(tmp_path, model, method):
     seen = carried_out(plan_in(tmp_path / method, method, 2, model if methods.needs_model(method) else None))
     assert seen.phase is Phase.COMPLETE
     assert [trial.kind for trial in seen.trials] == ["random", "random", "suggested", "suggested"]
-    starts = MotionLedger(tmp_path / method / "starts.jsonl").entries()
-    assert [entry["event"] for entry in starts] == ["started", "ended"] * 4
+    known = home_of_campaign(tmp_path / method, "franka-rehearsal").ledger.entries()
+    own = [entry for entry in known if str(entry.facts.get("trial", "")).startswith(seen.name)]
+    assert [entry.event for entry in own] == ["granted", "started", "ended"] * 4
 
 
 @pytest.mark.parametrize("method", ["se", "svae-dc"])

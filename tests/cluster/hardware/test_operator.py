@@ -60,7 +60,7 @@ def test_a_running_trial_can_be_resolved_at_once_and_is_replaced_by_another(proc
         assert [trial.state for trial in book.trials()] == [outcome, *4 * ["measured"]]
         past = [event for event in book.events() if event.trial == 0]
     assert [event.new for event in past][-3:] == ["running", "unknown", outcome]
-    assert json.loads(past[-2].body)["ledger"] == {"started": True, "measurement": None}
+    assert json.loads(past[-2].body)["ledger"] == {"started": True, "measurement": None, "certain": True}
     assert past[-1].who == "operator: Ada"
     assert json.loads(past[-1].body) == {"note": "it fell"}
 

@@ -59,7 +59,7 @@ from svaedc.bo.strategies import UniformSearch
 def setup():
     return setups.load("quadratic-30d")
 
-ARM = Robot("arm", "own_lab:setup", lambda *_: None)
+ARM = Robot("arm", "own_lab:setup", "own_lab:Arm")
 
 def mine(problem):
     return UniformSearch(problem.dimensions)

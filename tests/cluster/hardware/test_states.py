@@ -11,6 +11,8 @@ DESIGN = {
     ("checked", "rejected"),
     ("checked", "approved"),
     ("approved", "granted"),
+    ("approved", "checked"),  # withdrawn by a person, or lapsed
+    ("approved", "rejected"),
     ("granted", "approved"),
     ("granted", "running"),
     ("granted", "unknown"),

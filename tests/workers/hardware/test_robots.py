@@ -7,8 +7,11 @@ import pytest
 
 from tests.packages import install
 from workers.hardware import robots
-from workers.hardware.rehearsal import RehearsalRobot
+from workers.hardware.driver import RobotFault
+from workers.hardware.rehearsal import RehearsalMachine
 from workers.hardware.robots import Robot
+from workers.host.home import RobotHome
+from workers.host.limits import Limits
 from workers.randomness import Stream, generator
 
 SOURCE = '''
@@ -18,10 +21,11 @@ from workers import setups
 from workers.hardware.robots import Robot
 from workers.physics import around
 
-def connect(seed, pace, folder):
-    raise OSError("no cable")
+class Arm:
+    def __init__(self):
+        raise OSError("no cable")
 
-ARM = Robot("arm", "lab_robots:puck", connect)
+ARM = Robot("arm", "lab_robots:puck", "lab_robots:Arm")
 
 def arm():
     """The arm, when it is asked for."""
@@ -53,8 +57,10 @@ def lab(tmp_path, monkeypatch):
 def test_a_robot_of_a_package_or_a_module_is_known_by_the_name_that_was_asked_for(name, tmp_path):
     robot = robots.find(name)
     assert (robot.name, robot.setup, robot.simulated) == (name, "lab_robots:puck", False)
-    with pytest.raises(OSError, match="no cable"):
-        robot.connect(0, 0.0, tmp_path)
+    driver = robot.connect(0, 0.0, RobotHome(tmp_path / "home", name).make(), Limits())
+    assert (driver.name, driver.setup) == (name, "lab_robots:puck")
+    with pytest.raises(RobotFault, match=r"does not start: OSError: no cable"):
+        driver.check("a", np.full(30, 0.5))
 
 
 @pytest.mark.usefixtures("lab")
@@ -66,7 +72,7 @@ def test_a_robot_of_a_package_or_a_module_is_known_by_the_name_that_was_asked_fo
         ("lab_robots:AMR", "module 'lab_robots' has no 'AMR'; did you mean 'ARM'"),
         (
             "lab_robots:broken",
-            r"lab_robots:broken failed with ZeroDivisionError: .*lab_robots\.py:18",
+            r"lab_robots:broken failed with ZeroDivisionError: .*lab_robots\.py:19",
         ),
         ("lab_robots:puck", r"must be a workers\.hardware\.robots\.Robot or a function .* got Setup"),
         ("rehearsal:frnka", "unknown setup 'frnka'; did you mean 'franka'"),
@@ -92,20 +98,20 @@ def test_a_name_that_ships_stays_what_it_is_whatever_packages_offer():
 def test_any_setup_is_rehearsed_by_itself_and_said_to_be_simulated(setup, tmp_path):
     robot = robots.find(f"rehearsal:{setup}")
     assert robot.simulated
-    driver = robot.connect(3, 0.0, tmp_path)
-    assert isinstance(driver, RehearsalRobot)
+    driver = robot.connect(3, 0.0, RobotHome(tmp_path / "home", robot.name).make(), Limits())
     assert (driver.name, driver.setup) == (robot.name, robot.setup) == (f"rehearsal:{setup}", setup)
     x = np.full(30, 0.5)
     assert driver.run("a", x).f == pytest.approx(30 * 1.5**2)
+    driver.stop()
 
 
 @pytest.mark.usefixtures("lab")
-def test_the_hidden_physics_of_a_rehearsal_is_drawn_once_from_the_wide_gap(tmp_path):
-    driver = robots.find("rehearsal:lab_robots:puck").connect(3, 0.0, tmp_path)
+def test_the_hidden_physics_of_a_rehearsal_is_drawn_once_from_the_wide_gap():
+    machine = RehearsalMachine("lab_robots:puck", "lab_robots:puck", 3)
     mass = generator(3, Stream.HIDDEN_PHYSICS, 0).uniform(1.0, 3.0)
-    assert driver._physics == {"mass": mass}
+    assert machine._physics == {"mass": mass}
 
 
 def test_of_robots_that_ship_all_are_simulated_and_one_that_does_not_say_so_is_real():
     assert all(robot.simulated for robot in robots.ROBOTS.values())
-    assert not Robot("arm", "franka", lambda *_: None).simulated
+    assert not Robot("arm", "franka", "lab:Arm").simulated

@@ -1,0 +1,1 @@
+"""The robot beside its campaigns: its home, its limits, and its stop."""

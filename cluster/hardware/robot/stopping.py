@@ -1,0 +1,133 @@
+"""`svaedc hardware stop` and `clear`: straight to the robot's host, past Ray, campaigns and drivers."""
+
+import os
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+
+from cluster.errors import UsageError, UserError
+from cluster.hardware.robot.residence import home_of, robot_errors
+from workers.hardware.gate import CLEARED
+from workers.host import stop as way
+from workers.host.home import RobotHome
+from workers.host.latch import Stop
+from workers.host.ledger import LedgerDamaged
+from workers.host.stop import Answer
+
+STOPPED = "stopped"
+"""An event of the ledger: somebody stopped the robot."""
+BY_KILLING = frozenset({"hold", "sag"})
+"""Where a robot's motors do this without their host, a host that hangs is killed to stop it."""
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """What a stop did.
+
+    Attributes:
+        answer: of the host.
+        killed: whether a host that did not answer was killed.
+        advice: for the person in charge.
+    """
+
+    answer: Answer
+    killed: bool
+    advice: str
+
+
+def stop(robot: str, home: Path | None, who: str, reason: str) -> Stopping:
+    """Stop a robot, whatever else hangs: set its latch, tell its host, and kill that one where it must be.
+
+    Args:
+        robot: its name.
+        home: folder that a person named; None for the usual one.
+        who: stops it.
+        reason: in words.
+
+    Returns:
+        What happened.
+
+    Raises:
+        UserError: the robot has no home here, or neither latch nor host could be reached.
+    """
+    found = _existing(robot, home)
+    with robot_errors():
+        answer = way.request(found, Stop(who, reason))
+        killed = not answer.reached and _kill(found)
+        _note(found, STOPPED, {"who": who, "reason": reason})
+    return Stopping(answer, killed, _advice(found, answer, killed))
+
+
+def clear(robot: str, home: Path | None, who: str, note: str) -> str:
+    """Let a stopped robot move again; for a person who stands at it.
+
+    Args:
+        robot: its name.
+        home: folder that a person named; None for the usual one.
+        who: has looked at the robot.
+        note: what they saw.
+
+    Returns:
+        Why it had been stopped; "" when it was not.
+
+    Raises:
+        UsageError: nobody is named, or nothing was seen.
+        UserError: the robot has no home here, or the ledger takes no more.
+    """
+    if not who.strip() or not note.strip():
+        raise UsageError("a stop is cleared by a person who has seen the robot: give --who NAME --note TEXT")
+    found = _existing(robot, home)
+    with robot_errors():
+        why = found.latch.read()
+        if why is None:
+            return ""
+        found.ledger.append(CLEARED, {"who": who.strip(), "note": note.strip(), "stop": str(why)})
+        found.latch.clear()
+    return str(why)
+
+
+def _existing(robot: str, home: Path | None) -> RobotHome:
+    found = home_of(robot, home)
+    if not found.path.is_dir():
+        raise UserError(
+            f"{found.path} is no robot's home: no campaign of {robot} was ever begun with it here; name the "
+            "robot as `svaedc robots` does, or its home with --home"
+        )
+    return found
+
+
+def _kill(home: RobotHome) -> bool:
+    """Kill a host that does not answer, where that brings the motors to rest."""
+    host = home.read_host()
+    if not home.holder() or host.get("rest", {}).get("kill") not in BY_KILLING:
+        return False
+    try:
+        os.kill(int(host["pid"]), signal.SIGKILL)
+    except (OSError, KeyError, ValueError):
+        return False
+    return True
+
+
+def _note(home: RobotHome, event: str, facts: dict[str, str]) -> None:
+    """The latch already holds; a ledger that cannot be written must not make a stop fail."""
+    try:
+        home.ledger.append(event, facts)
+    except (OSError, LedgerDamaged):
+        return
+
+
+def _advice(home: RobotHome, answer: Answer, killed: bool) -> str:  # noqa: FBT001
+    rest = home.read_host().get("rest", {})
+    again = f"It stays stopped until: svaedc hardware clear {home.robot} --who NAME --note TEXT"
+    if answer.reached:
+        return f"the robot's host has stopped; its motors {answer.rest}. {again}"
+    if killed:
+        return (
+            f"the robot's host did not answer and was killed; without it its motors {rest['kill']}. {again}"
+        )
+    if not home.holder():
+        return f"no host is at the robot, which gets no commands. {again}"
+    return (
+        "the robot's host did not answer, and its driver says that killing it lets the motors "
+        f"{rest.get('kill', 'do what nobody declared')}: USE THE ROBOT'S OWN EMERGENCY STOP. {again}"
+    )

@@ -1,0 +1,154 @@
+"""What a robot did, ever: an append-only record in which every line vouches for all lines before it."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from workers.host import durable
+
+FIRST = "0" * 64
+"""The first line follows this."""
+CUT = "cut"
+"""An event: the last line was cut off, by a power cut or a broken disk."""
+
+
+class LedgerDamaged(RuntimeError):  # noqa: N818 - names the state of the file
+    """The ledger is not what was written; nothing moves until a person has looked."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line.
+
+    Attributes:
+        seq: from 1.
+        at: UTC time, ISO 8601.
+        event: what happened.
+        facts: what is particular to it, plain values.
+        prev: hash of the line before.
+        hash: SHA-256 over all of the above.
+    """
+
+    seq: int
+    at: str
+    event: str
+    facts: Mapping[str, Any]
+    prev: str
+    hash: str
+
+    def expected_hash(self) -> str:
+        """The hash that the other fields have."""
+        fields = {name: value for name, value in asdict(self).items() if name != "hash"}
+        return hashlib.sha256(canonical(fields)).hexdigest()
+
+
+def canonical(value: Any) -> bytes:
+    """JSON with one spelling per value.
+
+    Raises:
+        ValueError: the value holds NaN or infinity.
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+
+
+class Ledger:
+    """The file of one robot; several processes may add to it.
+
+    Args:
+        path: of the file; its folder must exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def entries(self) -> list[Entry]:
+        """Every line, oldest first; one that was cut off at the end is none, see `is_cut`.
+
+        Raises:
+            LedgerDamaged: a line was altered, or is missing.
+            OSError: the file cannot be read.
+        """
+        whole, _ = self._content()
+        return list(self._verified(whole))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the last line was cut off: something was about to happen, and may have happened.
+
+        Raises:
+            OSError: the file cannot be read.
+        """
+        return bool(self._content()[1])
+
+    def append(self, event: str, facts: Mapping[str, Any]) -> Entry:
+        """Add a line; it is on disk when this returns.
+
+        Args:
+            event: what happened, or is about to.
+            facts: what is particular to it, plain values.
+
+        Returns:
+            The line.
+
+        Raises:
+            LedgerDamaged: what is there is not whole.
+            OSError: the disk is full or broken; nothing was added.
+        """
+        with durable.exclusively(self.path.with_suffix(".lock")):
+            whole, rest = self._content()
+            known = list(self._verified(whole))
+            if rest:
+                known.append(self._close_cut(known, whole, rest))
+            return self._write(known, event, facts)
+
+    def _content(self) -> tuple[bytes, bytes]:
+        """The whole lines, and what stands behind the last of them."""
+        try:
+            content = self.path.read_bytes()
+        except FileNotFoundError:
+            return b"", b""
+        end = content.rfind(b"\n") + 1
+        return content[:end], content[end:]
+
+    def _verified(self, whole: bytes) -> Iterator[Entry]:
+        prev = FIRST
+        for number, line in enumerate(whole.split(b"\n")[:-1], start=1):
+            entry = _parsed(line)
+            if entry is None or entry.hash != entry.expected_hash():
+                raise self._damaged(f"line {number} was altered")
+            if (entry.seq, entry.prev) != (number, prev):
+                raise self._damaged(f"line {number} does not follow the one before it")
+            prev = entry.hash
+            yield entry
+
+    def _close_cut(self, known: list[Entry], whole: bytes, rest: bytes) -> Entry:
+        """Put a line in the place of one that was cut off, with what is left of that as evidence."""
+        durable.replace(self.path, whole)
+        return self._write(known, CUT, {"rest": rest.hex()})
+
+    def _write(self, known: list[Entry], event: str, facts: Mapping[str, Any]) -> Entry:
+        at = datetime.now(timezone.utc).isoformat()  # noqa: UP017 - also for Python 3.10
+        made = Entry(len(known) + 1, at, event, dict(facts), known[-1].hash if known else FIRST, "")
+        sealed = Entry(made.seq, made.at, made.event, made.facts, made.prev, made.expected_hash())
+        durable.append(self.path, canonical(asdict(sealed)) + b"\n")
+        return sealed
+
+    def _damaged(self, what: str) -> LedgerDamaged:
+        return LedgerDamaged(
+            f"the robot's ledger {self.path} is damaged: {what}. Nothing moves. Keep the file, find out "
+            "which trials moved the robot, and restore a copy of it, or rename it: then every campaign asks "
+            "for a person"
+        )
+
+
+def _parsed(line: bytes) -> "Entry | None":
+    try:
+        fields = json.loads(line)
+        entry = Entry(**fields)
+        return entry if canonical(asdict(entry)) == line and isinstance(entry.facts, dict) else None
+    except (ValueError, TypeError, RecursionError):
+        return None

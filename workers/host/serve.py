@@ -1,0 +1,193 @@
+"""The life of a host: it has one robot, answers its lines, and comes to rest when nobody asks any more."""
+
+import hashlib
+import os
+import queue
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from typing import Any, BinaryIO
+
+from workers.host import motion, protocol, stop
+from workers.host.guard import SILENCE_SECONDS, Guard, now
+from workers.host.home import RobotHome
+from workers.host.ledger import LedgerDamaged
+from workers.host.limits import Limits, Watch, extremes, first_objection
+from workers.host.machine import Fault, Machine
+from workers.host.motion import Pulse, Stopped
+
+STARTED, ENDED, BROKEN = "started", "ended", "broken"
+"""Events of the ledger: a trial is about to move the robot; it came to its end; it did not."""
+
+
+@dataclass
+class Host:
+    """What serves one robot.
+
+    Attributes:
+        home: of the robot.
+        machine: the robot.
+        limits: of the robot.
+        say: sends a message to whoever drives the host.
+        period: s between two commands; 0 for as fast as it goes.
+        silence: s without a sign of life of whoever drives the host after which it stops.
+    """
+
+    home: RobotHome
+    machine: Machine
+    limits: Limits
+    say: Callable[[Mapping[str, Any]], None]
+    period: float
+    silence: float = SILENCE_SECONDS
+    pulse: Pulse = field(default_factory=Pulse)
+    guard: Guard = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Listen for stops from now on."""
+        self.guard = Guard(self.home.latch, self.silence)
+        facts = {"pid": os.getpid(), "rest": self.machine.rest.stop}
+        self._stop_listening = stop.listen(self.home, self.guard, self.pulse, lambda: facts)
+        threading.Thread(
+            target=motion.watch_over,
+            args=(self.guard, self.pulse, self.machine, self._give_up),
+            name="watchdog",
+            daemon=True,
+        ).start()
+
+    def greet(self) -> None:
+        """Say who is here."""
+        self.say(
+            {
+                "say": "hello",
+                "protocol": protocol.VERSION,
+                "pid": os.getpid(),
+                "rest": asdict(self.machine.rest),
+                "period": self.machine.period,
+                "channels": [asdict(channel) for channel in self.machine.channels],
+            }
+        )
+
+    def answer(self, message: Mapping[str, Any]) -> None:
+        """Do what a message asks; whatever the machine's code does, the answer says it.
+
+        Args:
+            message: `plan` or `run`.
+        """
+        trial = str(message.get("trial", ""))
+        try:
+            x = protocol.decode(message.get("x"))
+            if message.get("do") == "plan":
+                self.say({"say": "planned", "trial": trial, **self._planned(x)})
+            elif message.get("do") == "run":
+                self.say(self._run(trial, x, float(message.get("seconds", 0.0))))
+            else:
+                raise ValueError(f"a host does plan, run, beat and close, not {message.get('do')!r}")
+        except (ValueError, TypeError, OSError, LedgerDamaged) as error:
+            self.say({"say": "refused", "trial": trial, "reason": str(error)})
+
+    def close(self) -> None:
+        """Come to rest, and let go of the robot."""
+        with suppress(Exception):
+            self.machine.stop()
+        with suppress(Exception):
+            self.machine.close()
+        self._stop_listening()
+
+    def _planned(self, x: "tuple[float, ...]") -> "dict[str, Any]":
+        plan = self.machine.plan(x)
+        found = first_objection(Watch(self.limits, plan.channels, plan.period), plan.rows)
+        if not found and plan.seconds > self.limits.duration:
+            found = f"a trial must take at most {self.limits.duration:g} s, and this takes {plan.seconds:g}"
+        return {
+            "seconds": plan.seconds,
+            "steps": len(plan.rows),
+            "channels": [] if found else list(extremes(plan.channels, plan.rows)),
+            "objection": found,
+        }
+
+    def _run(self, trial: str, x: "tuple[float, ...]", seconds: float) -> "dict[str, Any]":
+        """Move the robot once; the ledger knows it before anything moves, and what became of it."""
+        found = self._planned(x)["objection"] or self._not_yet(trial)
+        if found:
+            return {"say": "refused", "trial": trial, "reason": found}
+        ledger = self.home.ledger
+        self.guard.deadline = now() + min(seconds, self.limits.duration)
+        self.guard.beat = now()
+        ledger.append(STARTED, {"trial": trial, "x": hashlib.sha256(protocol.encode(x).encode()).hexdigest()})
+        self.say({"say": "started", "trial": trial})
+        watch = Watch(self.limits, self.machine.channels, self.machine.period)
+        try:
+            measured = motion.run(self.machine, x, watch, self.guard, self.pulse, self.period)
+            ledger.append(ENDED, {"trial": trial, "measurement": measured, **self._commands()})
+        except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
+            what, reason = _told(error)
+            ledger.append(BROKEN, {"trial": trial, "what": what, "reason": reason, **self._commands()})
+            return {"say": what, "trial": trial, "reason": reason}
+        return {"say": "ended", "trial": trial, "measurement": measured, **self._commands()}
+
+    def _not_yet(self, trial: str) -> str:
+        """Why a trial must not start at all."""
+        if self.home.latch.is_set:
+            return str(self.home.latch.read())
+        if self.guard.asked.is_set():
+            return self.guard.why
+        started = {e.facts.get("trial") for e in self.home.ledger.entries() if e.event == STARTED}
+        if trial in started:
+            return (
+                f"trial {trial} has already moved the robot according to {self.home.ledger.path}; it is not "
+                "run again: a repetition is a trial of its own"
+            )
+        return ""
+
+    def _commands(self) -> "dict[str, Any]":
+        pulse = self.pulse
+        return {"commands": pulse.commands, "late": pulse.late, "last_command": pulse.last_command}
+
+    def _give_up(self, found: str) -> None:
+        """The driver hangs: leave, which the ledger and whoever drives this will notice."""
+        reason = f"{found}; and the driver did not come to rest"
+        with suppress(Exception):
+            self.home.ledger.append(BROKEN, {"trial": "", "what": "hangs", "reason": reason})
+        os._exit(4)
+
+
+def serve(host: Host, lines: BinaryIO) -> None:
+    """Answer messages until they end, or one says `close`.
+
+    Args:
+        host: that answers.
+        lines: they come from here.
+    """
+    messages: queue.Queue[Mapping[str, Any]] = queue.Queue()
+
+    def read() -> None:
+        for line in iter(lines.readline, b""):
+            try:
+                message = protocol.message_of(line)
+            except ValueError as error:
+                message = {"do": "nothing", "reason": str(error)}
+            host.guard.beat = now()
+            if message.get("do") != "beat":
+                messages.put(message)
+        host.guard.stop("the process that drives the host is gone")
+        messages.put({"do": "close"})
+
+    threading.Thread(target=read, name="lines", daemon=True).start()
+    host.greet()
+    while (message := messages.get()).get("do") != "close":
+        host.answer(message)
+
+
+def _told(error: Exception) -> "tuple[str, str]":
+    """What an error means, and its reason."""
+    if isinstance(error, Stopped):
+        return "stopped", str(error)
+    if isinstance(error, Fault):
+        return "fault", str(error)
+    traceback.print_exc(file=sys.stderr)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{os.path.basename(place.filename)}, line {place.lineno}"  # noqa: PTH119 - a name, no path
+    return "broke", f"{type(error).__name__}: {error} ({where})"
