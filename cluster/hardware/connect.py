@@ -16,10 +16,13 @@ from cluster.hardware.actor import PREFIX, RESOURCE, HardwareActor
 from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.status import Status
 from cluster.runtime.machines import has_a_place
+from cluster.runtime.ray_internals import claim_name, give_up_name
 
 POLL_SECONDS = 0.5
 ENTRANCES = 10
 LEAVE_SECONDS = 5.0
+TAKEOVER_SECONDS = 15.0
+"""The command of a driver that was killed can be repeated within this."""
 NOTICE_SECONDS = 10.0
 """After this a person is told what the command waits for."""
 PLACE_SECONDS = 120.0
@@ -54,13 +57,32 @@ def at_the_robot(options: dict[str, Any], plan: CampaignPlan, say: Say) -> Itera
         Handle of the actor, and how the campaign stood when the plan was entered.
 
     Raises:
-        UserError: when there is no place on the robot's machine, or the plan cannot be carried out.
+        UserError: when there is no place on the robot's machine, another command drives it, or the plan
+            cannot be carried out.
     """
-    actor, first = _enter(options, plan, say)
+    with _alone(f"{options['namespace']}/{options['name']}", plan):
+        actor, first = _enter(options, plan, say)
+        try:
+            yield actor, first
+        finally:
+            _withdraw(actor, plan)
+
+
+@contextmanager
+def _alone(name: str, plan: CampaignPlan) -> Iterator[None]:
+    """The robot's actor for this command alone: another one's Ctrl-C must not end this one's trial."""
+    deadline = time.monotonic() + TAKEOVER_SECONDS
+    while other := claim_name(name):
+        if time.monotonic() >= deadline:  # Ray takes a moment to notice a driver's death
+            raise UserError(
+                f"the robot {plan.identity.robot!r} is driven by another command already, process "
+                f"{other['DriverPid']} on {other['DriverIPAddress']}: wait until it has ended, or end it"
+            )
+        time.sleep(POLL_SECONDS)
     try:
-        yield actor, first
+        yield
     finally:
-        _withdraw(actor, plan)
+        give_up_name(name)
 
 
 def _enter(options: dict[str, Any], plan: CampaignPlan, say: Say) -> tuple[Any, Status]:

@@ -13,8 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import ray
 from ray._private import ray_constants, services, state, worker
 from ray._raylet import AuthenticationTokenLoader, Config, GcsClient  # type: ignore[attr-defined]
+from ray.experimental import internal_kv
 
 from cluster.home import is_writable
 
@@ -84,6 +86,34 @@ def actor_facts(actor: Any) -> Mapping[str, Any]:
         `State`, `Address` and more.
     """
     return state.actors(actor._actor_id.hex()) or {}
+
+
+def claim_name(name: str) -> Mapping[str, Any]:
+    """Have a name in the connected cluster for this driver, as long as it lives.
+
+    Args:
+        name: that one driver at a time may have.
+
+    Returns:
+        Nothing where it is this driver's now; else what the head knows of the one that has it: `DriverPid`,
+        `DriverIPAddress` and more.
+    """
+    own, key = ray.get_runtime_context().get_job_id().encode(), name.encode()
+    if not internal_kv._internal_kv_put(key, own, overwrite=False):
+        return {}
+    holder = internal_kv._internal_kv_get(key) or b""
+    alive = [job for job in state.jobs() if job["JobID"].encode() == holder and not job["IsDead"]]
+    if alive and holder != own:
+        return alive[0]
+    internal_kv._internal_kv_put(key, own, overwrite=True)
+    return {}
+
+
+def give_up_name(name: str) -> None:
+    """Let another driver have a name, if it is this one's."""
+    own, key = ray.get_runtime_context().get_job_id().encode(), name.encode()
+    if internal_kv._internal_kv_get(key) == own:
+        internal_kv._internal_kv_del(key)
 
 
 def free_resources() -> list[Mapping[str, float]]:

@@ -302,3 +302,26 @@ def test_a_killed_local_driver_leaves_an_unknown_trial_and_then_goes_on(tmp_path
     assert driving(tmp_path, "", "lab", 0.0).wait(timeout=180) == 0
     assert operator.status(folder).phase is Phase.COMPLETE
     assert len(set(starts(folder))) == len(starts(folder)) == 3
+
+
+@pytest.mark.slow
+def test_a_second_command_is_refused_and_told_who_drives_the_robot(
+    ray_session, tracker, settings, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(connect, "TAKEOVER_SECONDS", 1.0)
+    folder = tmp_path / "campaign"
+    first = driving(tmp_path, ray_session.address, settings.namespace, LONG_PACE_SECONDS)
+    try:
+        deadline = time.monotonic() + 180
+        while not moving(folder) and time.monotonic() < deadline:
+            time.sleep(0.1)
+        joined = Session(ray_session.address, is_local=False, cpus=ray_session.cpus)
+        with pytest.raises(
+            UserError, match=rf"is driven by another command already, process {first.pid} on 127"
+        ):
+            start(settings, joined, tracker, plan_in(folder), lambda _: None, print)
+        assert state_of(folder, 0) is State.RUNNING
+    finally:
+        os.kill(lock.holder(folder).pid, signal.SIGKILL)
+        first.kill()
+        first.wait()

@@ -5,16 +5,18 @@ import os
 import signal
 from contextlib import closing
 from dataclasses import asdict, replace
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from cluster.errors import UsageError
+from cluster.errors import UsageError, UserError
 from cluster.hardware import campaign, journal, operator
 from cluster.hardware.journal import IllegalTransition
 from cluster.hardware.lock import FolderLock, FolderTaken
 from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
+from workers import setups
 
 IN_MOTION = 13
 
@@ -158,3 +160,68 @@ def test_the_export_is_the_campaign_and_every_event(tmp_path):
     assert first == {"campaign": "desk-1", **IDENTITY.facts()}
     with closing(opened(tmp_path)) as book:
         assert events == [asdict(event) for event in book.events()]
+
+
+WAITING = replace(IDENTITY, approval=Approval.OPERATOR)
+
+
+def test_an_approval_is_bound_holds_for_a_while_and_can_be_withdrawn(tmp_path):
+    carry_out(tmp_path, identity=WAITING)
+    operator.approve(tmp_path, 0, "Ada", minutes=5.0)
+    with closing(opened(tmp_path)) as book:
+        bounds = json.loads(book.events()[-1].body)
+    left = datetime.fromisoformat(bounds["until"]) - datetime.now(UTC)
+    assert timedelta(minutes=4) < left <= timedelta(minutes=5.0)
+    assert len(bounds["limits"]) == len(bounds["sha256"]) == 64
+    assert operator.withdraw(tmp_path, 0, "Grace").state is State.CHECKED
+    assert operator.status(tmp_path).phase is Phase.AWAITS_APPROVAL
+    with pytest.raises(IllegalTransition, match="from checked to checked"):
+        operator.withdraw(tmp_path, 0, "Grace")
+    for minutes in (0.0, -1.0, float("inf"), float("nan")):
+        with pytest.raises(UsageError, match="an approval must hold for some minutes, got"):
+            operator.approve(tmp_path, 0, "Ada", minutes)
+
+
+def test_a_rejected_controller_never_comes_back_and_another_waits(tmp_path):
+    carry_out(tmp_path, identity=WAITING)
+    with pytest.raises(UsageError, match="a rejection needs a note that says why"):
+        operator.reject(tmp_path, 0, "Ada", " ")
+    assert operator.reject(tmp_path, 0, "Ada", "it looks wild").state is State.REJECTED
+    carry_out(tmp_path, identity=WAITING)
+    seen = operator.status(tmp_path)
+    assert (seen.phase, len(seen.trials)) == (Phase.AWAITS_APPROVAL, 2)
+    assert seen.trials[0].x_hex != seen.trials[1].x_hex
+    assert starts(tmp_path) == []
+
+
+def test_only_a_measured_trial_is_amended_and_the_old_value_stays(tmp_path):
+    carry_out(tmp_path, faulty=frozenset({1}))
+    assert operator.amend(tmp_path, 0, "Ada", "tape", -0.25, 0.5).measurement == (-0.25, 0.5)
+    with pytest.raises(UsageError, match="only a measured trial can be amended, trial 1 is failed"):
+        operator.amend(tmp_path, 1, "Ada", "tape", -0.25, 0.5)
+
+
+def test_an_objective_that_the_setup_rules_out_is_typed_twice(tmp_path):
+    known = replace(IDENTITY, setup="quadratic-30d")
+    carry_out(tmp_path, identity=known)
+    low, high = setups.load("quadratic-30d").objective_limits
+    for f in (low - 1, high + 1, 1e308):
+        with pytest.raises(
+            UsageError, match=r"must lie in .*, got .* if it is meant, type it again with --confirm"
+        ):
+            operator.amend(tmp_path, 0, "Ada", "tape", f, 0.5)
+        with pytest.raises(UsageError, match="type it again"):
+            operator.amend(tmp_path, 0, "Ada", "tape", f, 0.5, confirmed=f / 2)
+    assert operator.amend(tmp_path, 0, "Ada", "tape", high + 1, 0.5, confirmed=high + 1).f == high + 1
+    assert operator.amend(tmp_path, 0, "Ada", "tape", high, 0.5).f == high
+
+
+def test_who_only_looks_writes_nothing(tmp_path, monkeypatch):
+    carry_out(tmp_path)
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere but on read-only media
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    seen, exported = operator.status(tmp_path), list(operator.export(tmp_path))
+    assert (seen.phase, seen.folder, len(exported)) == (Phase.COMPLETE, tmp_path, 1 + 4 * 6)
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    with pytest.raises(UserError, match=f"no campaign in {tmp_path / 'none'}"):
+        operator.status(tmp_path / "none")
