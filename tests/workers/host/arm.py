@@ -15,7 +15,8 @@ class Arm(Machine):
 
     rest = Rest(stop="hold", kill="sag", silence="go on", disconnect="drop")
 
-    def __init__(self, log, trouble="", at=10, steps=STEPS, kill="sag"):
+    def __init__(self, log, trouble="", at=10, steps=STEPS, kill="sag", seed=0):
+        del seed  # nothing is hidden here
         self.rest = Rest(stop="hold", kill=kill, silence="go on", disconnect="drop")
         self.period = PERIOD
         self.channels = tuple(HostChannel(f"joint{number}", "position", "rad") for number in (1, 2))
