@@ -21,12 +21,13 @@ from pathlib import Path
 import numpy as np
 
 from workers.hardware.driver import RobotFault
-from workers.hardware.hosted import HostedRobot, Machinery
+from workers.hardware.host_process import Machinery
+from workers.hardware.hosted import HostedRobot
 from workers.host import stop
 from workers.host.guard import now
 from workers.host.home import RobotHome
 from workers.host.latch import Stop
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 
 ROOT = Path(__file__).parents[1]
 MACHINE = "tests.workers.host.arm:Arm"
@@ -87,7 +88,7 @@ def robot_in(folder: Path) -> Iterator[tuple[HostedRobot, Path]]:
     """A robot behind its host."""
     log = folder / "commands.log"
     machinery = Machinery(MACHINE, sys.executable, {"log": str(log), "steps": STEPS})
-    robot = HostedRobot("desk", "desk", RobotHome(folder, "desk").make(), machinery, Limits())
+    robot = HostedRobot("desk", "desk", RobotHome(folder, "desk").make(), machinery, RobotLimits())
     robot.check("first", X)
     yield robot, log
     robot.stop()

@@ -1,9 +1,7 @@
 """A hardware campaign: which step comes next, and that each is in the journal before the robot feels it."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,6 +9,7 @@ from jaxtyping import Float
 
 from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.journal import Journal
+from cluster.hardware.robot.approvals import lapse_of
 from cluster.hardware.states import TERMINAL, State
 from cluster.hardware.status import RANDOM_TRIALS, Phase, RobotGate, phase_at, phase_of
 from svaedc.bo.history import History
@@ -48,7 +47,13 @@ class CampaignGate(RobotGate, Protocol):
     """What must be true of the robot before a trial may move it; see `workers.hardware.gate.Gate`."""
 
     def grant(self, campaign: str, trial_id: str, journal: str) -> None:
-        """Tell the robot's ledger which journal lets a trial move it."""
+        """Tell the robot's ledger which journal lets a trial move it.
+
+        Args:
+            campaign: its name.
+            trial_id: of the trial.
+            journal: hash of the event that granted it.
+        """
         ...
 
     def motion(self, trial_id: str) -> Motion:
@@ -56,7 +61,15 @@ class CampaignGate(RobotGate, Protocol):
         ...
 
     def plan(self, trial_id: str, x: np.ndarray) -> Mapping[str, Any]:
-        """What a controller will ask of the robot, with an objection where it must not run."""
+        """Let the robot plan a controller; nothing moves.
+
+        Args:
+            trial_id: of the trial.
+            x: the controller, [D], in [0, 1].
+
+        Returns:
+            What it will ask of the robot, with an `objection` where it must not run.
+        """
         ...
 
     def approval(self) -> Mapping[str, Any]:
@@ -248,24 +261,11 @@ def approve(journal: Journal, trial: CampaignTrial, who: str, bounds: Mapping[st
     return record(journal, trial, State.APPROVED, who, {"sha256": trial.sha256, **bounds})
 
 
-def _lapse(campaign: Campaign, trial: CampaignTrial) -> str:
-    """Why an approval no longer holds; "" while it does."""
-    [*_, last] = (event for event in campaign.journal.events() if event.trial == trial.number)
-    bounds = json.loads(last.body)
-    if bounds.get("until") and utc_now() >= datetime.fromisoformat(bounds["until"]):
-        return f"the approval of {last.who} held until {bounds['until']}"
-    now = campaign.gate.approval()
-    if bounds.get("limits", now["limits"]) != now["limits"]:
-        return f"the robot's limits have changed since the approval of {last.who}"
-    if last.at < now["cleared"]:
-        return f"the robot was stopped since the approval of {last.who}"
-    return ""
-
-
 def _perform(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     """Moves the robot once; what the driver declares a fault is failed, all else that breaks is unknown."""
     journal, name = campaign.journal, trial_id(campaign.journal, trial)
-    lapse = _lapse(campaign, trial)
+    approved = journal.last_event(trial.number)
+    lapse = lapse_of(approved, campaign.gate.approval(), utc_now())
     if lapse:
         return record(journal, trial, State.CHECKED, "executor", {"reason": lapse})
     granted = record(journal, trial, State.GRANTED, "executor", campaign.process)

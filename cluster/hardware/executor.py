@@ -21,8 +21,7 @@ from cluster.hardware.states import State
 from cluster.hardware.status import Status, status
 from workers import setups
 from workers.hardware import robots
-from workers.hardware.gate import Gate
-from workers.hardware.hosted import holder_facts
+from workers.hardware.gate import Gate, holder_facts
 from workers.host.home import RobotHeld, RobotHome
 
 PATIENCE_SECONDS = 30.0
@@ -49,7 +48,7 @@ class Executor:
             _make(plan.folder)
             stack.enter_context(FolderLock(plan.folder, PATIENCE_SECONDS))
             home = residence.enter(plan.folder, plan.identity.robot, plan.home)
-            stack.enter_context(_held(home, plan.folder))
+            stack.enter_context(_hold_robot(home, plan.folder))
             self._journal = stack.enter_context(closing(_journal(plan)))
             self._campaign, self._gate = _campaign(plan, self._journal, home)
             stack.callback(self._campaign.robot.stop)
@@ -83,13 +82,13 @@ def _make(folder: Path) -> None:
 
 
 @contextmanager
-def _held(home: RobotHome, folder: Path) -> Iterator[None]:
+def _hold_robot(home: RobotHome, folder: Path) -> Iterator[None]:
     """The robot, for this process alone."""
     deadline = time.monotonic() + PATIENCE_SECONDS
     while True:
         with ExitStack() as stack:
             try:
-                stack.enter_context(home.held(holder_facts(folder, socket.gethostname())))
+                stack.enter_context(home.hold(holder_facts(folder, socket.gethostname())))
             except RobotHeld:
                 if time.monotonic() >= deadline:
                     raise

@@ -159,6 +159,15 @@ class Journal:
         with sqlite_errors(self.path):
             return self._events("ORDER BY seq")
 
+    def last_event(self, number: int) -> Event:
+        """How a trial came to where it stands.
+
+        Raises:
+            JournalError: when the campaign has no trial of that number.
+        """
+        self.trial(number)
+        return next(event for event in reversed(self.events()) if event.trial == number)
+
     def verify(self) -> None:
         """Checks the file, the hash chain, and that the trials are what the events add up to.
 

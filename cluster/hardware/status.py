@@ -223,14 +223,14 @@ def _advice(
 
 def _reason(journal: Journal, number: int) -> str:
     """Why a trial failed or was rejected; the journal's last event may be another trial's amendment."""
-    last = next(event for event in reversed(journal.events()) if event.trial == number)
+    last = journal.last_event(number)
     body = json.loads(last.body)
     return f"{last.new}: {body.get(REASONS[last.new], body.get('note'))}"
 
 
 def _since(journal: Journal, number: int) -> str:
     """When a trial came to where it stands."""
-    last = next(event for event in reversed(journal.events()) if event.trial == number)
+    last = journal.last_event(number)
     return last.at.partition(".")[0].replace("T", " ") + " UTC"
 
 

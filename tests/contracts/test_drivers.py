@@ -18,7 +18,7 @@ from workers.hardware.robots import Robot
 from workers.host import stop
 from workers.host.home import RobotHome
 from workers.host.latch import Stop
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
@@ -97,7 +97,9 @@ def let_go():
 
 def connected(robot, folder, limits=None):
     home = RobotHome(folder / "home", robot.name).make()
-    CONNECTED.append(robot.connect(SEED, 0.0, home, Limits.read(limits or {}, "limits")))
+    CONNECTED.append(
+        robot.connect(SEED, 0.0, home, RobotLimits.read({"silence": 60, **(limits or {})}, "limits"))
+    )
     return CONNECTED[-1]
 
 

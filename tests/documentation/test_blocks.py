@@ -31,6 +31,7 @@ NOT_RUN = {
     "docs/results/franka.md": 3,
     "docs/results/quadratic.md": 1,
     "docs/results/reproduction.md": 1,
+    "docs/results/transfer.md": 1,
     "docs/tutorial/first-steps.md": 5,
 }
 """So many blocks of these pages are not run; each says why in a comment above it."""

@@ -1,5 +1,6 @@
 """What must be true of a robot before a trial may move it, and what its ledger is told of that."""
 
+import os
 from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -11,11 +12,12 @@ from jaxtyping import Float
 
 from workers.hardware import ledger as before
 from workers.hardware.driver import Motion
-from workers.hardware.hosted import HostedRobot, motion_in
+from workers.hardware.hosted import HostedRobot
 from workers.hardware.ledger import MotionLedger
+from workers.hardware.records import motion_in
 from workers.host.home import RobotHome
-from workers.host.ledger import Entry
-from workers.host.limits import Limits
+from workers.host.ledger import LedgerEntry
+from workers.host.limits import RobotLimits
 from workers.host.serve import STARTED
 
 GRANTED, ADOPTED, CLEARED = "granted", "adopted", "cleared"
@@ -38,7 +40,7 @@ class Gate:
     """
 
     home: RobotHome
-    limits: Limits
+    limits: RobotLimits
     folder: Path
     robot: HostedRobot | None = None
 
@@ -141,10 +143,10 @@ class Gate:
         cleared = [entry.at for entry in self.home.ledger.entries() if entry.event == CLEARED]
         return {"limits": self.limits.sha256, "cleared": cleared[-1] if cleared else ""}
 
-    def _of(self, campaign: str) -> Iterator[Entry]:
+    def _of(self, campaign: str) -> Iterator[LedgerEntry]:
         return (entry for entry in self.home.ledger.entries() if entry.facts.get("campaign") == campaign)
 
-    def _older(self, entry: Entry) -> str:
+    def _older(self, entry: LedgerEntry) -> str:
         return (
             f"the journal in {self.folder} is not the one that the robot {self.home.robot} knows: the "
             f"robot's ledger has trial {entry.facts['trial']} granted at {entry.at}, and this journal has "
@@ -152,3 +154,16 @@ class Gate:
             "the robot may have done already. Go on in the folder that has that trial. If it is lost, begin "
             "a new campaign in another folder"
         )
+
+
+def holder_facts(campaign: Path, machine: str) -> dict[str, Any]:
+    """What others are told of the process that has a robot.
+
+    Args:
+        campaign: folder of the campaign.
+        machine: name of the computer.
+
+    Returns:
+        Plain values.
+    """
+    return {"campaign": str(campaign), "pid": os.getpid(), "host": machine}

@@ -12,7 +12,7 @@ from workers.controllers.controller import PlanTimes
 from workers.environments.environment import Channel
 from workers.hardware.robots import GAP
 from workers.host.limits import HostChannel
-from workers.host.machine import Fault, Machine, Plan, Rest
+from workers.host.machine import Fault, Plan, Rest, RobotMachine
 from workers.randomness import Stream, generator
 from workers.rollout import Steps
 from workers.user_code import describe
@@ -20,7 +20,7 @@ from workers.user_code import describe
 _KINDS: Final = {"rad": "position", "rad/s": "speed", "N·m": "torque", "m": "workspace"}
 
 
-class RehearsalMachine(Machine):
+class RehearsalMachine(RobotMachine):
     """A setup whose physics is drawn once from the wide gap and never shown to the campaign.
 
     Args:
@@ -40,7 +40,7 @@ class RehearsalMachine(Machine):
         self.channels = tuple(map(_host_channel, self._environment.action))
 
     def plan(self, x: Sequence[float]) -> Plan:
-        """What the controller wants, as far as its kind can tell it; see `Machine.plan`.
+        """What the controller wants, as far as its kind can tell it; see `RobotMachine.plan`.
 
         Args:
             x: the controller, each parameter in [0, 1].
@@ -58,7 +58,7 @@ class RehearsalMachine(Machine):
         return Plan(tuple(map(_host_channel, channels)), period, rows.T.tolist(), seconds)
 
     def begin(self, x: Sequence[float]) -> None:
-        """Reset the simulation; see `Machine.begin`.
+        """Reset the simulation; see `RobotMachine.begin`.
 
         Raises:
             Fault: the code of the setup failed.
@@ -67,24 +67,24 @@ class RehearsalMachine(Machine):
             self._steps = Steps(self._setup, self._environment, np.array(x, np.float32), self._physics)
 
     def command(self, step: int) -> list[float] | None:
-        """See `Machine.command`."""
+        """See `RobotMachine.command`."""
         del step  # the episode counts its own
         with _faults():
-            command = self._begun().command()
+            command = self._current().command()
             return None if command is None else [float(value) for value in command]
 
     def send(self, command: Sequence[float]) -> None:
-        """One step of the simulation; see `Machine.send`."""
+        """One step of the simulation; see `RobotMachine.send`."""
         with _faults():
-            self._begun().apply(command)
+            self._current().apply(command)
 
     def stop(self) -> None:
         """Nothing moves between two steps."""
 
     def end(self) -> dict[str, Any]:
-        """See `Machine.end`."""
+        """See `RobotMachine.end`."""
         with _faults():
-            episode = self._begun().episode()
+            episode = self._current().episode()
         if not np.isfinite(episode.f):
             raise Fault("the simulation exploded")
         return {
@@ -98,7 +98,7 @@ class RehearsalMachine(Machine):
         """End the simulation."""
         self._environment.close()
 
-    def _begun(self) -> Steps:
+    def _current(self) -> Steps:
         if self._steps is None:
             raise Fault("no controller was begun")
         return self._steps

@@ -7,9 +7,10 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from workers import plug_ins, setups
-from workers.hardware.hosted import HostedRobot, Machinery
+from workers.hardware.host_process import Machinery
+from workers.hardware.hosted import HostedRobot
 from workers.host.home import RobotHome
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 from workers.plug_ins import Kind, Part
 from workers.user_modules import call
 
@@ -31,7 +32,7 @@ class Robot:
     Attributes:
         name: under which it is asked for; what a user's own calls itself is replaced by that.
         setup: name of the setup it realises.
-        machine: its driver, as `module:name` of a subclass of `workers.host.machine.Machine`.
+        machine: its driver, as `module:name` of a subclass of `workers.host.machine.RobotMachine`.
         python: interpreter of the environment that the driver is installed in.
         settings: keyword arguments of the machine, plain values.
         simulated: whether it is a simulated stand-in, whose trials need nobody's approval.
@@ -44,7 +45,7 @@ class Robot:
     settings: Mapping[str, Any] = field(default_factory=dict)
     simulated: bool = False
 
-    def connect(self, seed: int, pace: float, home: RobotHome, limits: Limits) -> HostedRobot:
+    def connect(self, seed: int, pace: float, home: RobotHome, limits: RobotLimits) -> HostedRobot:
         """The robot behind its host, which starts when it is first asked something.
 
         Args:

@@ -30,7 +30,7 @@ def main() -> int:
     _let_itself_be_imported()
     from workers.host import protocol
     from workers.host.home import RobotHome
-    from workers.host.limits import Limits
+    from workers.host.limits import RobotLimits
     from workers.host.serve import Host, serve
 
     parser = argparse.ArgumentParser(description=__doc__)
@@ -51,7 +51,7 @@ def main() -> int:
         settings = json.loads(options.settings)
         sys.path += [entry for entry in settings.get("path", ()) if entry not in sys.path]
         machine = _machine(options.machine, settings.get("machine", {}))
-        limits = Limits.read(settings.get("limits", {}), "limits")
+        limits = RobotLimits.read(settings.get("limits", {}), "limits")
         home = RobotHome(options.home, options.robot)
         period = float(settings.get("period", machine.period))
         host = Host(home, machine, limits, say, period, float(settings["silence"]))

@@ -49,11 +49,11 @@ class Guard:
         return next((found for condition in _CONDITIONS if (found := condition(self))), "")
 
 
-def _asked(guard: Guard) -> str:
+def _stop_request(guard: Guard) -> str:
     return (guard.why or "a stop was asked for") if guard.asked.is_set() else ""
 
 
-def _latched(guard: Guard) -> str:
+def _latch_reason(guard: Guard) -> str:
     return str(guard.latch.read() or "") if guard.latch.is_set else ""
 
 
@@ -72,5 +72,5 @@ def _late(guard: Guard) -> str:
     return f"the trial's time is over since {over:.2f} s" if over > 0 else ""
 
 
-_CONDITIONS: "tuple[Callable[[Guard], str], ...]" = (_latched, _asked, _silent, _late)
+_CONDITIONS: "tuple[Callable[[Guard], str], ...]" = (_latch_reason, _stop_request, _silent, _late)
 """A command is sent only where none of these objects."""

@@ -77,7 +77,7 @@ class RobotHome:
         return Path(tempfile.gettempdir()) / f"svaedc-{os.getuid()}-{name}.socket"
 
     @contextmanager
-    def held(self, holder: dict[str, Any]) -> Iterator[None]:
+    def hold(self, holder: dict[str, Any]) -> Iterator[None]:
         """Have the robot for oneself; the death of the process gives it back.
 
         Args:
@@ -92,7 +92,7 @@ class RobotHome:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 file.seek(0)
-                raise RobotHeld(f"the robot {self.robot} is held by {_told(file.read())}") from None
+                raise RobotHeld(f"the robot {self.robot} is held by {_in_words(file.read())}") from None
             file.truncate(0)
             file.write(json.dumps(holder))
             file.flush()
@@ -107,7 +107,7 @@ class RobotHome:
                 try:
                     fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    return _told(file.read())
+                    return _in_words(file.read())
         except OSError:
             pass
         return ""
@@ -129,7 +129,7 @@ class RobotHome:
         return found if isinstance(found, dict) else {}
 
 
-def _told(text: str) -> str:
+def _in_words(text: str) -> str:
     try:
         facts = json.loads(text)
         return f"the campaign in {facts['campaign']} (process {facts['pid']} on {facts['host']})"

@@ -21,7 +21,7 @@ class LedgerDamaged(RuntimeError):  # noqa: N818 - names the state of the file
 
 
 @dataclass(frozen=True)
-class Entry:
+class LedgerEntry:
     """One line.
 
     Attributes:
@@ -65,7 +65,7 @@ class Ledger:
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[LedgerEntry]:
         """Every line, oldest first; one that was cut off at the end is none, see `is_cut`.
 
         Raises:
@@ -73,7 +73,7 @@ class Ledger:
             OSError: the file cannot be read.
         """
         whole, _ = self._content()
-        return list(self._verified(whole))
+        return list(self._verified_entries(whole))
 
     @property
     def is_cut(self) -> bool:
@@ -84,7 +84,7 @@ class Ledger:
         """
         return bool(self._content()[1])
 
-    def append(self, event: str, facts: Mapping[str, Any]) -> Entry:
+    def append(self, event: str, facts: Mapping[str, Any]) -> LedgerEntry:
         """Add a line; it is on disk when this returns.
 
         Args:
@@ -100,7 +100,7 @@ class Ledger:
         """
         with durable.exclusively(self.path.with_suffix(".lock")):
             whole, rest = self._content()
-            known = list(self._verified(whole))
+            known = list(self._verified_entries(whole))
             if rest:
                 known.append(self._close_cut(known, whole, rest))
             return self._write(known, event, facts)
@@ -114,30 +114,30 @@ class Ledger:
         end = content.rfind(b"\n") + 1
         return content[:end], content[end:]
 
-    def _verified(self, whole: bytes) -> Iterator[Entry]:
+    def _verified_entries(self, whole: bytes) -> Iterator[LedgerEntry]:
         prev = FIRST
         for number, line in enumerate(whole.split(b"\n")[:-1], start=1):
-            entry = _parsed(line)
+            entry = _parsed_entry(line)
             if entry is None or entry.hash != entry.expected_hash():
-                raise self._damaged(f"line {number} was altered")
+                raise self._damage(f"line {number} was altered")
             if (entry.seq, entry.prev) != (number, prev):
-                raise self._damaged(f"line {number} does not follow the one before it")
+                raise self._damage(f"line {number} does not follow the one before it")
             prev = entry.hash
             yield entry
 
-    def _close_cut(self, known: list[Entry], whole: bytes, rest: bytes) -> Entry:
+    def _close_cut(self, known: list[LedgerEntry], whole: bytes, rest: bytes) -> LedgerEntry:
         """Put a line in the place of one that was cut off, with what is left of that as evidence."""
         durable.replace(self.path, whole)
         return self._write(known, CUT, {"rest": rest.hex()})
 
-    def _write(self, known: list[Entry], event: str, facts: Mapping[str, Any]) -> Entry:
+    def _write(self, known: list[LedgerEntry], event: str, facts: Mapping[str, Any]) -> LedgerEntry:
         at = datetime.now(timezone.utc).isoformat()  # noqa: UP017 - also for Python 3.10
-        made = Entry(len(known) + 1, at, event, dict(facts), known[-1].hash if known else FIRST, "")
-        sealed = Entry(made.seq, made.at, made.event, made.facts, made.prev, made.expected_hash())
+        made = LedgerEntry(len(known) + 1, at, event, dict(facts), known[-1].hash if known else FIRST, "")
+        sealed = LedgerEntry(made.seq, made.at, made.event, made.facts, made.prev, made.expected_hash())
         durable.append(self.path, canonical(asdict(sealed)) + b"\n")
         return sealed
 
-    def _damaged(self, what: str) -> LedgerDamaged:
+    def _damage(self, what: str) -> LedgerDamaged:
         return LedgerDamaged(
             f"the robot's ledger {self.path} is damaged: {what}. Nothing moves. Keep the file, find out "
             "which trials moved the robot, and restore a copy of it, or rename it: then every campaign asks "
@@ -145,10 +145,10 @@ class Ledger:
         )
 
 
-def _parsed(line: bytes) -> "Entry | None":
+def _parsed_entry(line: bytes) -> "LedgerEntry | None":
     try:
         fields = json.loads(line)
-        entry = Entry(**fields)
+        entry = LedgerEntry(**fields)
         return entry if canonical(asdict(entry)) == line and isinstance(entry.facts, dict) else None
     except (ValueError, TypeError, RecursionError):
         return None

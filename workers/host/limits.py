@@ -12,7 +12,7 @@ ALL = "*"
 """This name in a table of limits stands for every channel that it does not name."""
 KINDS = ("position", "speed", "acceleration", "torque", "workspace")
 _RANGES = ("position", "workspace")
-_NUMBERS = ("duration", "rest", "trials_per_hour", "trials_per_day")
+_NUMBERS = ("duration", "rest", "trials_per_hour", "trials_per_day", "silence")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class HostChannel:
 
 
 @dataclass(frozen=True)
-class Limits:
+class RobotLimits:
     """The limits of one robot.
 
     Attributes:
@@ -41,6 +41,7 @@ class Limits:
         rest: least time between the starts of two trials, in s.
         trials_per_hour: most starts in any hour.
         trials_per_day: most starts in any 24 hours.
+        silence: s without a sign of life of whoever drives the host, after which it stops; 0 for the usual.
     """
 
     tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -48,9 +49,10 @@ class Limits:
     rest: float = 0.0
     trials_per_hour: float = math.inf
     trials_per_day: float = math.inf
+    silence: float = 0.0
 
     @classmethod
-    def read(cls, values: Mapping[str, Any], source: str) -> "Limits":
+    def read(cls, values: Mapping[str, Any], source: str) -> "RobotLimits":
         """Check what a file of limits says.
 
         Args:
@@ -85,7 +87,15 @@ class Limits:
         return hashlib.sha256(canonical(self.facts())).hexdigest()
 
     def of(self, kind: str, name: str) -> Any:
-        """The limit of a channel; None where there is none."""
+        """Look up one limit.
+
+        Args:
+            kind: of the channel.
+            name: of the channel.
+
+        Returns:
+            The largest absolute value, or the range; None where there is no limit.
+        """
         table = self.tables.get(kind, {})
         return table.get(name, table.get(ALL))
 
@@ -107,7 +117,7 @@ class Limits:
         return max([0.0, *(moment - now for moment in due)])
 
 
-class Watch:
+class LimitWatch:
     """Looks at rows of a plan or at commands, one after the other, and objects to what is not allowed.
 
     Args:
@@ -116,7 +126,7 @@ class Watch:
         period: s between two rows.
     """
 
-    def __init__(self, limits: Limits, channels: Sequence[HostChannel], period: float) -> None:
+    def __init__(self, limits: RobotLimits, channels: Sequence[HostChannel], period: float) -> None:
         self._limits = limits
         self._channels = tuple(channels)
         self._period = period
@@ -175,7 +185,7 @@ class Watch:
         return f"the {kind} of {channel.name} must lie in [{low:g}, {high:g}], got {value:.6g}"
 
 
-def first_objection(watch: Watch, rows: Iterable[Sequence[Any]]) -> str:
+def first_objection(watch: LimitWatch, rows: Iterable[Sequence[Any]]) -> str:
     """Look at a whole plan.
 
     Args:

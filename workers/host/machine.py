@@ -16,7 +16,7 @@ class Rest:
     """What happens to the motors when there are no more commands, each one of `RESTS`.
 
     Attributes:
-        stop: after `Machine.stop`.
+        stop: after `RobotMachine.stop`.
         kill: after the host process was killed.
         silence: while the host is alive and sends nothing.
         disconnect: after the connection was closed.
@@ -65,7 +65,7 @@ class Fault(RuntimeError):  # noqa: N818 - a fault is what roboticists call it
     """The robot broke off, stands still, and has no valid objective to report."""
 
 
-class Machine(ABC):
+class RobotMachine(ABC):
     """A robot, as its host drives it; all calls come from one thread but for `stop`.
 
     Attributes:

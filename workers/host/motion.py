@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from workers.host.guard import Guard, now
-from workers.host.limits import Watch
-from workers.host.machine import Machine
+from workers.host.limits import LimitWatch
+from workers.host.machine import RobotMachine
 
 
 class Stopped(RuntimeError):  # noqa: N818 - names what happened
@@ -39,7 +39,7 @@ class Pulse:
 
 
 def run(
-    machine: Machine, x: Sequence[float], watch: Watch, guard: Guard, pulse: Pulse, period: float
+    machine: RobotMachine, x: Sequence[float], watch: LimitWatch, guard: Guard, pulse: Pulse, period: float
 ) -> dict[str, Any]:
     """Run a controller from the reset pose to its end.
 
@@ -52,7 +52,7 @@ def run(
         period: s between two commands; 0 for as fast as the machine goes.
 
     Returns:
-        What the motion was worth, as `Machine.end` measures it.
+        What the motion was worth, as `RobotMachine.end` measures it.
 
     Raises:
         Stopped: a stop, a deadline, silence or a limit ended it.
@@ -75,14 +75,14 @@ def run(
     return machine.end()
 
 
-def _bring_to_rest(machine: Machine, why: Exception) -> None:
+def _bring_to_rest(machine: RobotMachine, why: Exception) -> None:
     try:
         machine.stop()
     except Exception as error:
         raise NotAtRest(f"{why}; and the driver's stop failed: {type(error).__name__}: {error}") from error
 
 
-def _stream(machine: Machine, watch: Watch, guard: Guard, pulse: Pulse, period: float) -> None:
+def _stream(machine: RobotMachine, watch: LimitWatch, guard: Guard, pulse: Pulse, period: float) -> None:
     due, step = time.monotonic(), 0
     while (command := machine.command(step)) is not None:
         found = watch.objection(command)
@@ -106,7 +106,7 @@ def _wait(due: float, guard: Guard) -> None:
         guard.asked.wait(left)
 
 
-def watch_over(guard: Guard, pulse: Pulse, machine: Machine, give_up: Callable[[str], None]) -> None:
+def watch_over(guard: Guard, pulse: Pulse, machine: RobotMachine, give_up: Callable[[str], None]) -> None:
     """Bring the robot to rest where a command hangs in its driver; runs in a thread of its own, for ever.
 
     Args:

@@ -15,8 +15,8 @@ from workers.host import motion, protocol, stop
 from workers.host.guard import SILENCE_SECONDS, Guard, now
 from workers.host.home import RobotHome
 from workers.host.ledger import LedgerDamaged
-from workers.host.limits import Limits, Watch, extremes, first_objection
-from workers.host.machine import Fault, Machine
+from workers.host.limits import LimitWatch, RobotLimits, extremes, first_objection
+from workers.host.machine import Fault, RobotMachine
 from workers.host.motion import Pulse, Stopped
 
 STARTED, ENDED, BROKEN = "started", "ended", "broken"
@@ -37,8 +37,8 @@ class Host:
     """
 
     home: RobotHome
-    machine: Machine
-    limits: Limits
+    machine: RobotMachine
+    limits: RobotLimits
     say: Callable[[Mapping[str, Any]], None]
     period: float
     silence: float = SILENCE_SECONDS
@@ -80,7 +80,7 @@ class Host:
         try:
             x = protocol.decode(message.get("x"))
             if message.get("do") == "plan":
-                self.say({"say": "planned", "trial": trial, **self._planned(x)})
+                self.say({"say": "planned", "trial": trial, **self._plan_of(x)})
             elif message.get("do") == "run":
                 self.say(self._run(trial, x, float(message.get("seconds", 0.0))))
             else:
@@ -96,9 +96,9 @@ class Host:
             self.machine.close()
         self._stop_listening()
 
-    def _planned(self, x: "tuple[float, ...]") -> "dict[str, Any]":
+    def _plan_of(self, x: "tuple[float, ...]") -> "dict[str, Any]":
         plan = self.machine.plan(x)
-        found = first_objection(Watch(self.limits, plan.channels, plan.period), plan.rows)
+        found = first_objection(LimitWatch(self.limits, plan.channels, plan.period), plan.rows)
         if not found and plan.seconds > self.limits.duration:
             found = f"a trial must take at most {self.limits.duration:g} s, and this takes {plan.seconds:g}"
         return {
@@ -110,7 +110,7 @@ class Host:
 
     def _run(self, trial: str, x: "tuple[float, ...]", seconds: float) -> "dict[str, Any]":
         """Move the robot once; the ledger knows it before anything moves, and what became of it."""
-        found = self._planned(x)["objection"] or self._not_yet(trial)
+        found = self._plan_of(x)["objection"] or self._not_yet(trial)
         if found:
             return {"say": "refused", "trial": trial, "reason": found}
         ledger = self.home.ledger
@@ -118,12 +118,12 @@ class Host:
         self.guard.beat = now()
         ledger.append(STARTED, {"trial": trial, "x": hashlib.sha256(protocol.encode(x).encode()).hexdigest()})
         self.say({"say": "started", "trial": trial})
-        watch = Watch(self.limits, self.machine.channels, self.machine.period)
+        watch = LimitWatch(self.limits, self.machine.channels, self.machine.period)
         try:
             measured = motion.run(self.machine, x, watch, self.guard, self.pulse, self.period)
             ledger.append(ENDED, {"trial": trial, "measurement": measured, **self._commands()})
         except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
-            what, reason = _told(error)
+            what, reason = _meaning_of(error)
             ledger.append(BROKEN, {"trial": trial, "what": what, "reason": reason, **self._commands()})
             return {"say": what, "trial": trial, "reason": reason}
         return {"say": "ended", "trial": trial, "measurement": measured, **self._commands()}
@@ -181,7 +181,7 @@ def serve(host: Host, lines: BinaryIO) -> None:
         host.answer(message)
 
 
-def _told(error: Exception) -> "tuple[str, str]":
+def _meaning_of(error: Exception) -> "tuple[str, str]":
     """What an error means, and its reason."""
     if isinstance(error, Stopped):
         return "stopped", str(error)

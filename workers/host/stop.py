@@ -57,13 +57,13 @@ def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> 
         home.latch.set(stop)
     except OSError as error:
         trouble = error
-    answer = _told(home.socket, stop, patience)
+    answer = _ask_host(home.socket, stop, patience)
     if trouble is not None and not answer.reached:
         raise trouble
     return answer
 
 
-def _told(path: Path, stop: Stop, patience: float) -> Answer:
+def _ask_host(path: Path, stop: Stop, patience: float) -> Answer:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(patience)
         try:

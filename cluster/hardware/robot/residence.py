@@ -15,7 +15,7 @@ from workers.hardware.driver import RobotFault
 from workers.hardware.gate import GateShut
 from workers.host.home import RobotHeld, RobotHome
 from workers.host.ledger import LedgerDamaged
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 
 FILE: Final = "robot.json"
 """A campaign's folder says in it which home its robot has."""
@@ -98,10 +98,10 @@ def home_of_campaign(folder: Path, robot: str, home: Path | None = None) -> Robo
     Raises:
         UsageError: nobody knows where the user's home is.
     """
-    return home_of(robot, home or _remembered(folder))
+    return home_of(robot, home or _remembered_home(folder))
 
 
-def limits_of(home: RobotHome, simulated: bool) -> Limits:  # noqa: FBT001 - a fact of the robot, no switch
+def limits_of(home: RobotHome, simulated: bool) -> RobotLimits:  # noqa: FBT001 - a fact of the robot, no switch
     """The limits of a robot.
 
     Args:
@@ -116,10 +116,10 @@ def limits_of(home: RobotHome, simulated: bool) -> Limits:  # noqa: FBT001 - a f
     """
     try:
         with home.limits.open("rb") as file:
-            return Limits.read(tomllib.load(file), str(home.limits))
+            return RobotLimits.read(tomllib.load(file), str(home.limits))
     except FileNotFoundError:
         if simulated:
-            return Limits()
+            return RobotLimits()
         raise UserError(
             f"the robot {home.robot} has no limits, and does not move without: write {home.limits} "
             "(docs/how-to/hardware.md shows one)"
@@ -128,7 +128,7 @@ def limits_of(home: RobotHome, simulated: bool) -> Limits:  # noqa: FBT001 - a f
         raise UserError(f"cannot use the limits of {home.robot}: {error}") from error
 
 
-def _remembered(folder: Path) -> Path | None:
+def _remembered_home(folder: Path) -> Path | None:
     try:
         return Path(json.loads((folder / FILE).read_bytes())["home"])
     except (OSError, ValueError, KeyError, TypeError):

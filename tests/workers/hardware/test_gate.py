@@ -10,7 +10,7 @@ from workers.hardware.gate import Gate, GateShut
 from workers.hardware.ledger import FILE, MotionLedger
 from workers.host.home import RobotHome
 from workers.host.ledger import LedgerDamaged
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 from workers.host.serve import STARTED
 
 
@@ -22,7 +22,7 @@ def home(tmp_path):
 @pytest.fixture
 def gate(home, tmp_path):
     (tmp_path / "one").mkdir()
-    return Gate(home, Limits(), tmp_path / "one")
+    return Gate(home, RobotLimits(), tmp_path / "one")
 
 
 def test_a_folder_whose_journal_has_every_grant_goes_on(gate):
@@ -60,13 +60,13 @@ def test_a_campaign_of_before_brings_its_own_ledger_once(gate, tmp_path):
     shutil.copytree(gate.folder, tmp_path / "copy")
     gate.grant("desk-1", "desk-1-001", "b" * 64)
     with pytest.raises(GateShut, match="never heard of that"):
-        Gate(gate.home, Limits(), tmp_path / "copy").require("desk-1", {"a" * 64}, granted=True)
+        Gate(gate.home, RobotLimits(), tmp_path / "copy").require("desk-1", {"a" * 64}, granted=True)
 
 
 def test_rest_is_counted_from_the_starts_in_the_ledger(gate, home):
     assert gate.rest_seconds(datetime.now(UTC)) == 0
     home.ledger.append(STARTED, {"trial": "desk-1-000"})
-    resting = Gate(home, Limits.read({"rest": 100}, "limits"), gate.folder)
+    resting = Gate(home, RobotLimits.read({"rest": 100}, "limits"), gate.folder)
     assert 99 < resting.rest_seconds(datetime.now(UTC)) <= 100
     assert resting.rest_seconds(datetime.now(UTC) + timedelta(seconds=101)) == 0
 

@@ -10,7 +10,7 @@ from workers import setups
 from workers.hardware import robots
 from workers.hardware.driver import RobotFault
 from workers.host.home import RobotHome
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 from workers.randomness import Stream, generator
 from workers.rollout import rollout
 
@@ -34,7 +34,7 @@ def rehearsal(tmp_path):
 
     def connect(name=FRANKA, seed=5, pace=0.0, limits=None):
         home = RobotHome(tmp_path / "home", name).make()
-        made.append(robots.find(name).connect(seed, pace, home, Limits.read(limits or {}, "limits")))
+        made.append(robots.find(name).connect(seed, pace, home, RobotLimits.read(limits or {}, "limits")))
         return made[-1]
 
     yield connect

@@ -11,7 +11,7 @@ from workers.hardware.driver import RobotFault
 from workers.hardware.rehearsal import RehearsalMachine
 from workers.hardware.robots import Robot
 from workers.host.home import RobotHome
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 from workers.randomness import Stream, generator
 
 SOURCE = '''
@@ -57,7 +57,7 @@ def lab(tmp_path, monkeypatch):
 def test_a_robot_of_a_package_or_a_module_is_known_by_the_name_that_was_asked_for(name, tmp_path):
     robot = robots.find(name)
     assert (robot.name, robot.setup, robot.simulated) == (name, "lab_robots:puck", False)
-    driver = robot.connect(0, 0.0, RobotHome(tmp_path / "home", name).make(), Limits())
+    driver = robot.connect(0, 0.0, RobotHome(tmp_path / "home", name).make(), RobotLimits())
     assert (driver.name, driver.setup) == (name, "lab_robots:puck")
     with pytest.raises(RobotFault, match=r"does not start: OSError: no cable"):
         driver.check("a", np.full(30, 0.5))
@@ -98,7 +98,7 @@ def test_a_name_that_ships_stays_what_it_is_whatever_packages_offer():
 def test_any_setup_is_rehearsed_by_itself_and_said_to_be_simulated(setup, tmp_path):
     robot = robots.find(f"rehearsal:{setup}")
     assert robot.simulated
-    driver = robot.connect(3, 0.0, RobotHome(tmp_path / "home", robot.name).make(), Limits())
+    driver = robot.connect(3, 0.0, RobotHome(tmp_path / "home", robot.name).make(), RobotLimits())
     assert (driver.name, driver.setup) == (robot.name, robot.setup) == (f"rehearsal:{setup}", setup)
     x = np.full(30, 0.5)
     assert driver.run("a", x).f == pytest.approx(30 * 1.5**2)

@@ -5,12 +5,12 @@ import os
 import time
 
 from workers.host.limits import HostChannel
-from workers.host.machine import Fault, Machine, Plan, Rest
+from workers.host.machine import Fault, Plan, Rest, RobotMachine
 
 STEPS, PERIOD = 50, 0.01
 
 
-class Arm(Machine):
+class Arm(RobotMachine):
     """Joints that swing by x; at step `at`, `trouble` happens."""
 
     rest = Rest(stop="hold", kill="sag", silence="go on", disconnect="drop")

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workers.hardware.hosted import HostedRobot, Machinery
+from workers.hardware.host_process import Machinery
+from workers.hardware.hosted import HostedRobot
 from workers.host.home import RobotHome
-from workers.host.limits import Limits
+from workers.host.limits import RobotLimits
 
 ROOT = Path(__file__).parents[3]
 MACHINE = "tests.workers.host.arm:Arm"
@@ -34,7 +35,9 @@ def arm(home, log, monkeypatch):
 
     def connect(trouble="", limits=None, period=None, python=sys.executable, **settings):
         machinery = Machinery(MACHINE, python, {"log": os.fspath(log), "trouble": trouble, **settings})
-        made.append(HostedRobot("desk", "desk", home, machinery, Limits.read(limits or {}, "limits"), period))
+        made.append(
+            HostedRobot("desk", "desk", home, machinery, RobotLimits.read(limits or {}, "limits"), period)
+        )
         return made[-1]
 
     yield connect

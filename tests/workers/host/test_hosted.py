@@ -199,13 +199,14 @@ def test_a_host_that_does_not_start_says_why(arm):
 def drive(home, log, ready):
     """A process that drives a host, until it is stopped or killed."""
     os.chdir(os.environ["SVAEDC_TEST_ROOT"])
-    from workers.hardware.hosted import HostedRobot, Machinery
-    from workers.host.limits import Limits
+    from workers.hardware.host_process import Machinery
+    from workers.hardware.hosted import HostedRobot
+    from workers.host.limits import RobotLimits
 
     machinery = Machinery(
         "tests.workers.host.arm:Arm", sys.executable, {"log": os.fspath(log), "steps": 4000}
     )
-    robot = HostedRobot("desk", "desk", home, machinery, Limits(), 0.01)
+    robot = HostedRobot("desk", "desk", home, machinery, RobotLimits(), 0.01)
     robot.check("desk-0", X)
     ready.set()
     try:
@@ -263,11 +264,11 @@ def test_a_parent_that_is_killed_leaves_the_robot_at_rest_and_no_orphan(driven, 
 def test_a_home_serves_one_at_a_time_and_says_whom(home):
     holder = {"campaign": "/campaigns/one", "pid": 7, "host": "bench"}
     assert home.holder() == ""
-    with home.held(holder):
+    with home.hold(holder):
         assert home.holder() == "the campaign in /campaigns/one (process 7 on bench)"
         with (
             pytest.raises(RobotHeld, match=r"desk is held by the campaign in /campaigns/one \(process 7"),
-            home.held({}),
+            home.hold({}),
         ):
             pass
     assert home.holder() == ""

@@ -1,4 +1,4 @@
-"""Limits hold for plans and commands, and reject whatever they do not know to be allowed."""
+"""RobotLimits hold for plans and commands, and reject whatever they do not know to be allowed."""
 
 import math
 import random
@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from workers.host.limits import HostChannel, Limits, Watch, extremes, first_objection
+from workers.host.limits import HostChannel, LimitWatch, RobotLimits, extremes, first_objection
 
 JOINTS = (HostChannel("hip", "position", "rad"), HostChannel("knee", "position", "rad"))
-LIMITS = Limits.read(
+LIMITS = RobotLimits.read(
     {
         "position": {"*": [-1.0, 1.0], "knee": [0.0, 0.5]},
         "speed": {"*": 2.0},
@@ -41,7 +41,7 @@ LIMITS = Limits.read(
     ],
 )
 def test_positions_their_speeds_and_accelerations(rows, named):
-    found = first_objection(Watch(LIMITS, JOINTS, 0.01), rows)
+    found = first_objection(LimitWatch(LIMITS, JOINTS, 0.01), rows)
     assert re.fullmatch(named, found)
 
 
@@ -57,7 +57,7 @@ def test_positions_their_speeds_and_accelerations(rows, named):
     ],
 )
 def test_speeds_torques_and_the_workspace(channel, rows, named):
-    found = first_objection(Watch(LIMITS, [channel], 0.01), rows)
+    found = first_objection(LimitWatch(LIMITS, [channel], 0.01), rows)
     assert named in found
     assert bool(named) == bool(found)
 
@@ -72,7 +72,7 @@ def test_whatever_passes_lies_within_the_limits(times):
         for _ in range(rng.randrange(1, 12)):
             row = [rng.choice(odd) if rng.random() < 0.02 else v + rng.gauss(0, spread) for v in row]
             rows.append(row)
-        if first_objection(Watch(LIMITS, JOINTS, 0.01), rows):
+        if first_objection(LimitWatch(LIMITS, JOINTS, 0.01), rows):
             continue
         passed += 1
         for number, (hip, knee) in enumerate(rows):
@@ -99,13 +99,13 @@ def test_whatever_passes_lies_within_the_limits(times):
 )
 def test_what_is_no_limit_is_refused_with_its_name(values, named):
     with pytest.raises(ValueError, match=f"limits.toml: {named}"):
-        Limits.read(values, "limits.toml")
+        RobotLimits.read(values, "limits.toml")
 
 
 def test_limits_are_told_apart_by_their_values_and_come_back_from_plain_ones():
-    assert Limits.read(LIMITS.facts(), "again") == LIMITS
-    assert Limits.read({**LIMITS.facts(), "rest": 31}, "other").sha256 != LIMITS.sha256
-    assert Limits().facts() == {}
+    assert RobotLimits.read(LIMITS.facts(), "again") == LIMITS
+    assert RobotLimits.read({**LIMITS.facts(), "rest": 31}, "other").sha256 != LIMITS.sha256
+    assert RobotLimits().facts() == {}
 
 
 def test_rest_and_trials_of_an_hour_and_a_day_are_waited_for():
@@ -114,7 +114,7 @@ def test_rest_and_trials_of_an_hour_and_a_day_are_waited_for():
     assert LIMITS.wait_seconds([0.0, 40.0, 80.0], 200.0) == 3400
     assert LIMITS.wait_seconds([0.0, 4000.0, 8000.0, 12000.0, 16000.0], 20000.0) == 66_400
     assert LIMITS.wait_seconds([2000.0], 1000.0) == 1030  # the clock was set back
-    assert Limits().wait_seconds([999.9], 1000.0) == 0
+    assert RobotLimits().wait_seconds([999.9], 1000.0) == 0
 
 
 def test_extremes_are_told_by_channel():

@@ -46,7 +46,7 @@ def test_a_stop_holds_until_a_named_person_has_seen_the_robot(home):
 
 def hang(home, ready):
     """A process that has the robot and answers nothing."""
-    with home.held({"campaign": "/campaigns/one", "pid": os.getpid(), "host": "bench"}):
+    with home.hold({"campaign": "/campaigns/one", "pid": os.getpid(), "host": "bench"}):
         home.write_host({"pid": os.getpid(), "rest": {"stop": "hold", "kill": os.environ["REST"]}})
         ready.set()
         time.sleep(600)
@@ -152,9 +152,9 @@ def test_a_real_robot_needs_limits_and_a_rehearsal_does_not(home):
 
 def test_trouble_at_a_robot_is_told_in_words(home):
     with (
-        home.held({"campaign": "/c", "pid": 1, "host": "bench"}),
+        home.hold({"campaign": "/c", "pid": 1, "host": "bench"}),
         pytest.raises(UserError, match=r"desk is held by the campaign in /c \(process 1 on bench\): wait"),
         robot_errors(),
-        home.held({}),
+        home.hold({}),
     ):
         pass
