@@ -1,9 +1,12 @@
 """The child process in which a robot's host lives: started, spoken to, and ended."""
 
 import json
+import os
+import select
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -18,7 +21,9 @@ from workers.host.home import RobotHome
 START_SECONDS: Final = 120.0
 """A host says hello within this; loading a simulation takes a while on a busy machine."""
 LEAVE_SECONDS: Final = 2.0
-"""A host that is told to leave is gone after this, or is killed."""
+"""A host that is told to leave is gone after this, or is killed where that brings the motors to rest."""
+HARMLESS_TO_KILL: Final = frozenset({"hold", "sag"})
+"""Where a robot's motors do this without their host, one that hangs may be killed."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +76,19 @@ class HostProcess:
                     f"cannot start the process at {home.robot} with {machinery.python}: {error}"
                 ) from error
         self._lock = threading.Lock()
+        self._heard = b""
         self.hello: Mapping[str, Any] = {}
         self._wait_for_greeting(home)
 
     def _wait_for_greeting(self, home: RobotHome) -> None:
-        timer = threading.Timer(START_SECONDS, self._process.kill)
-        timer.start()
         try:
-            self.hello = self.listen()
-        except (EOFError, ValueError) as error:
+            self.hello = self.listen(START_SECONDS)
+        except (OSError, EOFError, ValueError) as error:
+            self._process.kill()
             self.leave()
             raise RobotFault(
                 f"the process at {home.robot} does not start ({self.end}); see {home.log}"
             ) from error
-        finally:
-            timer.cancel()
         if self.hello["say"] != "hello" or self.hello["protocol"] != protocol.VERSION:
             self.leave()
             raise RobotFault(
@@ -113,16 +116,29 @@ class HostProcess:
             _pipe(self._process.stdin).write(protocol.line_of(message))
             _pipe(self._process.stdin).flush()
 
-    def listen(self) -> Mapping[str, Any]:
+    def listen(self, seconds: float) -> Mapping[str, Any]:
         """Wait for the next message.
+
+        Args:
+            seconds: that it may take.
+
+        Returns:
+            The message.
 
         Raises:
             EOFError: there will be none.
+            TimeoutError: there was none in time.
             ValueError: it cannot be read.
         """
-        line = _pipe(self._process.stdout).readline()
-        if not line:
-            raise EOFError("its answers have ended")
+        pipe, deadline = _pipe(self._process.stdout), time.monotonic() + seconds
+        while b"\n" not in self._heard:
+            if not select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))[0]:
+                raise TimeoutError(f"no answer for {seconds:.0f} s")
+            heard = os.read(pipe.fileno(), 65536)
+            if not heard:
+                raise EOFError("its answers have ended")
+            self._heard += heard
+        line, _, self._heard = self._heard.partition(b"\n")
         return protocol.message_of(line)
 
     @contextmanager
@@ -146,14 +162,15 @@ class HostProcess:
             beater.join()
 
     def leave(self) -> None:
-        """Let the process come to rest and end; kill it where it does not."""
+        """Let the process come to rest and end; kill it where it does not, and where that does no harm."""
         with suppress(OSError, ValueError):
             _pipe(self._process.stdin).close()
         try:
             self._process.wait(LEAVE_SECONDS)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            if self.hello.get("rest", {}).get("kill") in HARMLESS_TO_KILL:
+                self._process.kill()
+                self._process.wait()
         _pipe(self._process.stdout).close()
 
 

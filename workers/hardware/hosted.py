@@ -19,6 +19,7 @@ from workers.host.limits import RobotLimits
 
 _SLACK: Final = 2.0
 _SIMULATED_SLACK: Final = 120.0
+_PATIENCE_SECONDS: Final = 30.0  # beyond the deadline of a trial, at which a host that lives answers
 _SIMULATED_SILENCE: Final = 15.0  # s: a simulation that fills a busy machine is not stopped for it
 
 
@@ -145,10 +146,11 @@ class HostedRobot:
     def _ask(self, message: Mapping[str, Any], trial_id: str = "") -> Mapping[str, Any]:
         """The host's answer; signs of life go to it until it has come."""
         started = self._process()
+        patience = float(message.get("seconds", 0.0)) + _PATIENCE_SECONDS
         try:
             with started.beating():
                 started.tell(message)
-                while (answer := started.listen())["say"] in ("started", "hello"):
+                while (answer := started.listen(patience))["say"] in ("started", "hello"):
                     pass
                 return answer
         except (OSError, EOFError, ValueError) as error:

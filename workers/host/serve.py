@@ -1,8 +1,10 @@
 """The life of a host: it has one robot, answers its lines, and comes to rest when nobody asks any more."""
 
 import hashlib
+import math
 import os
 import queue
+import re
 import sys
 import threading
 import traceback
@@ -121,6 +123,7 @@ class Host:
         watch = LimitWatch(self.limits, self.machine.channels, self.machine.period)
         try:
             measured = motion.run(self.machine, x, watch, self.guard, self.pulse, self.period)
+            _require_measurement(measured)
             ledger.append(ENDED, {"trial": trial, "measurement": measured, **self._commands()})
         except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
             what, reason = _meaning_of(error)
@@ -179,6 +182,19 @@ def serve(host: Host, lines: BinaryIO) -> None:
     host.greet()
     while (message := messages.get()).get("do") != "close":
         host.answer(message)
+
+
+def _require_measurement(measured: Any) -> None:
+    """Refuse what is no measurement before the ledger has it: nobody could read it again."""
+    if not isinstance(measured, dict) or not {"f", "y", "evidence"} <= measured.keys():
+        raise ValueError(f"`end` must return f, y, stop and evidence, got {measured!r:.200}")
+    f, y = measured["f"], measured["y"]
+    if not isinstance(f, (int, float)) or not math.isfinite(f):
+        raise ValueError(f"the objective f must be finite, got {f!r}")
+    if not isinstance(y, (int, float)) or not 0.0 <= y <= 1.0:
+        raise ValueError(f"the badness y must lie in [0, 1], got {y!r}")
+    if not re.fullmatch("[0-9a-f]{64}", str(measured["evidence"])):
+        raise ValueError(f"evidence must be a SHA-256 in hexadecimal, got {measured['evidence']!r:.80}")
 
 
 def _meaning_of(error: Exception) -> "tuple[str, str]":

@@ -8,6 +8,7 @@ from pathlib import Path
 from cluster.errors import UsageError, UserError
 from cluster.hardware.robot.residence import home_of, robot_errors
 from workers.hardware.gate import CLEARED
+from workers.hardware.host_process import HARMLESS_TO_KILL
 from workers.host import stop as way
 from workers.host.home import RobotHome
 from workers.host.latch import Stop
@@ -16,8 +17,6 @@ from workers.host.stop import Answer
 
 STOPPED = "stopped"
 """An event of the ledger: somebody stopped the robot."""
-BY_KILLING = frozenset({"hold", "sag"})
-"""Where a robot's motors do this without their host, a host that hangs is killed to stop it."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def _existing(robot: str, home: Path | None) -> RobotHome:
 def _kill(home: RobotHome) -> bool:
     """Kill a host that does not answer, where that brings the motors to rest."""
     host = home.read_host()
-    if not home.holder() or host.get("rest", {}).get("kill") not in BY_KILLING:
+    if not home.holder() or host.get("rest", {}).get("kill") not in HARMLESS_TO_KILL:
         return False
     try:
         os.kill(int(host["pid"]), signal.SIGKILL)

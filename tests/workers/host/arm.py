@@ -73,6 +73,10 @@ class Arm(RobotMachine):
             raise OSError("the bus is gone")
 
     def end(self):
+        if self._trouble == "measures nothing":
+            return {"f": float("nan"), "y": 0.25, "stop": "", "evidence": "a" * 64}
+        if self._trouble == "measures badly":
+            return {"f": 0.0, "y": 7, "stop": "", "evidence": "a" * 64}
         return {"f": sum(self._x), "y": 0.25, "stop": "", "evidence": hashlib.sha256(b"arm").hexdigest()}
 
     def _write(self, what, values):

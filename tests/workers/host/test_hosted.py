@@ -292,8 +292,37 @@ def test_messages_that_cannot_be_read_are_refused_and_nothing_moves(arm, log):
     for line in (b"nonsense\n", b"[1]\n", b"{}\n", b'{"do":"run","x":"00"}\n', b'{"do":"dance","x":""}\n'):
         host._process.stdin.write(line)
         host._process.stdin.flush()
-        assert host.listen()["say"] == "refused"
+        assert host.listen(60.0)["say"] == "refused"
     for x in (np.array([2.0, 0.0]), np.array([np.nan, 0.0])):
         with pytest.raises(RobotFault, match=r"every parameter of x must lie in \[0, 1\]"):
             robot.check("desk-0", x)
     assert commands(log) == []
+
+
+@pytest.mark.parametrize(
+    ("trouble", "named"),
+    [("measures nothing", "f must be finite, got nan"), ("measures badly", r"y must lie in \[0, 1\], got 7")],
+)
+def test_what_is_no_measurement_is_never_in_the_ledger_as_one(arm, home, trouble, named):
+    robot = arm(trouble, period=0.0)
+    with pytest.raises(RobotBroke, match=named):
+        robot.run("desk-0", X)
+    assert events(home) == [("started", "desk-0"), ("broken", "desk-0")]
+    assert robot.motion("desk-0").measurement is None
+
+
+@pytest.mark.parametrize(("kill", "survives"), [("sag", False), ("drop", True)])
+def test_a_host_that_does_not_answer_is_not_waited_for_for_ever(arm, home, log, monkeypatch, kill, survives):
+    robot = arm(period=0.05, kill=kill)
+    robot.check("desk-0", X)
+    monkeypatch.setattr("workers.hardware.hosted._PATIENCE_SECONDS", 4.0)
+    thread, outcome = in_background(robot.run, "desk-0", X)
+    wait_for(lambda: len(commands(log)) > 3)
+    host = home.read_host()["pid"]
+    os.kill(host, signal.SIGSTOP)
+    thread.join()
+    assert isinstance(outcome[0], RobotBroke)
+    assert re.search(rf"is gone \(.*no answer for \d+ s\).*; without it its motors {kill}", str(outcome[0]))
+    assert is_alive(host) is survives
+    if survives:
+        os.kill(host, signal.SIGKILL)
