@@ -12,6 +12,7 @@ from workers.plug_ins import Kind, Part, find, offer, package_of
 from workers.setups import SETUPS, registry
 
 NEEDS_MODEL = "needs a model"
+NEEDS_CANDIDATES = "needs candidates"
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,15 @@ def listed_setups() -> Iterator[Listed]:
 def listed_methods() -> Iterator[Listed]:
     """Every method; those that ship are not imported for it."""
     for name, summary in SUMMARIES.items():
-        yield Listed(name, NEEDS_MODEL if methods.needs_model(name) else "", summary)
+        yield Listed(name, _needs_of(name), summary)
     yield from _plug_ins(methods.KIND, lambda part: NEEDS_MODEL if methods.needs_model(part.name) else "")
+
+
+def _needs_of(method: str) -> str:
+    """What a method that ships cannot do without."""
+    needs = ((NEEDS_CANDIDATES, methods.needs_candidates), (NEEDS_MODEL, methods.needs_model))
+    found = [words for words, is_needed in needs if is_needed(method)]
+    return " and ".join(found).replace(" and needs ", " and ")
 
 
 def listed_robots() -> Iterator[Listed]:

@@ -32,7 +32,7 @@ class Latent:
     def __init__(self, problem):
         pass
 
-ARM = Robot("arm", "lab-quadratic", lambda *_: None)
+ARM = Robot("arm", "lab-quadratic", "lab_parts:Arm")
 '''
 OFFERS = {
     "svaedc.setups": {
@@ -88,6 +88,8 @@ def test_methods_and_robots_are_listed_with_what_they_need():
     methods = {row.name: row for row in listed_methods()}
     assert tuple(methods)[:-1] == names()
     assert methods["svae-dc"].facts == methods["lab-latent"].facts == "needs a model"
+    assert methods["simulated-best"].facts == "needs candidates"
+    assert methods["prior-svae-dc"].facts == "needs candidates and a model"
     assert (methods["random"].facts, methods["lab-latent"].summary) == ("", "Looks at latent paths.")
     robots = {row.name: row for row in listed_robots()}
     assert list(robots) == [*ROBOTS, "rehearsal:SETUP", "lab-arm"]
