@@ -1,5 +1,6 @@
 """`svaedc hardware`: campaigns on one robot, and what a person decides in them."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -245,5 +246,22 @@ def _show(now: "Status") -> None:
         f, y = ("" if value is None else f"{value:+.3f}" for value in (trial.f, trial.y))
         table.add_row(str(trial.number), str(trial.state), trial.kind, f, y)
     show(table)
+    for line in _motion_lines(now):
+        say(line)
     if now.advice:
         say(now.advice)
+
+
+def _motion_lines(now: "Status") -> Iterator[str]:
+    """What the trial that waits will do, for the person who approves it."""
+    plan = now.motion.get("plan", {})
+    if not plan:
+        return
+    predicted = now.motion.get("predicted_y")
+    expected = "" if predicted is None else f"; badness as the model expects it: {predicted:.2f}"
+    yield f"what it will do: {plan['seconds']:g} s of motion{expected}"
+    for channel in plan["channels"]:
+        yield f"  {channel['name']:<20} {channel['low']:+9.3f} to {channel['high']:+9.3f} {channel['unit']}"
+    if plan.get("rest"):
+        rests = ", ".join(f"after {event} they {rest}" for event, rest in plan["rest"].items())
+        yield f"what its motors do without commands: {rests}"

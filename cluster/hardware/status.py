@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
@@ -89,6 +89,7 @@ class Status:
         trials: by number.
         advice: a sentence for the person in charge; "" when nothing is asked of them.
         folder: of the campaign.
+        motion: what the trial that waits for approval will do, as its check found it: `plan`, `predicted_y`.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Status:
     trials: tuple[CampaignTrial, ...]
     advice: str
     folder: Path
+    motion: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def planned(self) -> int:
@@ -158,7 +160,15 @@ def status(journal: Journal, executor: Process | None, gate: RobotGate | None = 
     if gate is not None:
         now = phase_at(gate, now, trials)
     advice = _advice(journal, trials, now, executor, gate)
-    return Status(journal.name, journal.identity, now, trials, advice, journal.path.parent)
+    motion = _checked_motion(journal, trials) if now is Phase.AWAITS_APPROVAL else {}
+    return Status(journal.name, journal.identity, now, trials, advice, journal.path.parent, motion)
+
+
+def _checked_motion(journal: Journal, trials: Sequence[CampaignTrial]) -> Mapping[str, Any]:
+    """What the check found of the trial that waits; an approval that was withdrawn may have come since."""
+    number = next(trial.number for trial in trials if trial.state is State.CHECKED)
+    bodies = [json.loads(event.body) for event in journal.events() if event.trial == number]
+    return next((body for body in reversed(bodies) if "plan" in body), {})
 
 
 def phase_at(gate: RobotGate, phase: Phase, trials: Sequence[CampaignTrial]) -> Phase:

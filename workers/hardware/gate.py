@@ -130,13 +130,15 @@ class Gate:
             x: the controller, [D], in [0, 1].
 
         Returns:
-            Plain values: `seconds`, `steps`, `channels` with their extremes, and `objection`, why it must not
-            run, or "".
+            Plain values: `seconds`, `steps`, `channels` with their extremes, `objection`, why it must not
+            run, or "", and `rest`, what the robot's motors do without commands.
 
         Raises:
             RobotFault: the process at the robot does not answer.
         """
-        return asdict(self.robot.check(trial_id, x)) if self.robot else {}
+        if self.robot is None:
+            return {}
+        return {**asdict(self.robot.check(trial_id, x)), "rest": dict(self.robot.hello["rest"])}
 
     def approval(self) -> dict[str, str]:
         """What an approval is bound to: `limits`, their SHA-256, and `cleared`, when a stop last was."""

@@ -120,6 +120,8 @@ def test_a_waiting_trial_is_named_with_the_command_that_approves_it(tmp_path):
     assert seen.phase is Phase.AWAITS_APPROVAL
     assert f"svaedc hardware approve {tmp_path} --trial 0 --who NAME" in seen.advice
     assert operator.approve(tmp_path, 0, "Ada").state is State.APPROVED
+    assert seen.motion["plan"] == {"objection": "", "seconds": 50.0}
+    assert operator.status(tmp_path).motion == {}
     with pytest.raises(IllegalTransition, match="from approved to approved"):
         operator.approve(tmp_path, 0, "Grace")
 
