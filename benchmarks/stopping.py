@@ -78,7 +78,7 @@ def one_stop(state: str) -> float:
 def commands(log: Path) -> list[float]:
     """When each command was sent."""
     with suppress(FileNotFoundError):
-        rows = [line.split() for line in log.read_text().splitlines()]
+        rows = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
         return [float(row[0]) for row in rows if row[1] == "command"]
     return []
 
