@@ -39,8 +39,8 @@ METHODS = ("random", "screened-random", "se", "svae", "svae-dc")
 """What `compare` compares unless it is told otherwise."""
 AS_CONFIGURED: Mapping[str, Any] = {}
 """No setting is changed."""
-Models = Path | str | Sequence[Path | str]
-"""These are folders of trained models: one, several, or, as (), none."""
+Models = Path | str | Sequence[Path | str] | None
+"""These are folders of trained models: one, several or none."""
 
 
 def setup_names() -> tuple[str, ...]:
@@ -291,7 +291,7 @@ def _setup(setup: Setup | str) -> Setup:
 
 
 def _folders(models: Models) -> list[Path]:
-    given = [models] if isinstance(models, str | Path) else models
+    given = [models] if isinstance(models, str | Path) else models or ()
     return [Path(model).absolute() for model in given]
 
 

@@ -1,5 +1,6 @@
 """`svaedc reproduce`: a figure of the paper, from data to picture."""
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -116,13 +117,10 @@ def _say_cost(reproductions: "Sequence[Reproduction]", settings: "Settings", add
     from cluster.reproduction.run import say_cost
     from cluster.runtime.session import connect
 
-    if not address:
+    with connect(settings.ray, address) if address else nullcontext() as session:
+        count = session.cpus if session else cores(settings)
         for reproduction in reproductions:
-            say_cost(reproduction, settings, cores(settings))
-        return
-    with connect(settings.ray, address) as session:
-        for reproduction in reproductions:
-            say_cost(reproduction, settings, session.cpus)
+            say_cost(reproduction, settings, count)
 
 
 def _require_consistent(settings: "Settings", dataset: "Location | None", episodes: int | None) -> None:

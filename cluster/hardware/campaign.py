@@ -269,7 +269,7 @@ def _perform(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
     if lapse:
         return record(journal, trial, State.CHECKED, "executor", {"reason": lapse})
     granted = record(journal, trial, State.GRANTED, "executor", campaign.process)
-    campaign.gate.grant(journal.name, name, journal.events()[-1].hash)
+    campaign.gate.grant(journal.name, name, journal.last_event(trial.number).hash)
     running = record(journal, granted, State.RUNNING, "executor", campaign.process)
     try:
         measured = campaign.robot.run(name, running.x)

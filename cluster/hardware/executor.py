@@ -1,10 +1,9 @@
 """The one process that carries a campaign out: it holds the robot, the campaign's folder and its journal."""
 
-import socket
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from uuid import uuid4
 
@@ -21,7 +20,7 @@ from cluster.hardware.states import State
 from cluster.hardware.status import Status, status
 from workers import setups
 from workers.hardware import robots
-from workers.hardware.gate import Gate, holder_facts
+from workers.hardware.gate import Gate
 from workers.host.home import RobotHeld, RobotHome
 
 PATIENCE_SECONDS = 30.0
@@ -50,9 +49,9 @@ class Executor:
             home = residence.enter(plan.folder, plan.identity.robot, plan.home)
             stack.enter_context(_hold_robot(home, plan.folder))
             self._journal = stack.enter_context(closing(_journal(plan)))
-            self._campaign, self._gate = _campaign(plan, self._journal, home)
+            gate = _gate(plan, self._journal, home)
+            self._campaign = _campaign(plan, self._journal, gate)
             stack.callback(self._campaign.robot.stop)
-            _require_own(self._gate, self._journal)
             campaign.recover(self._campaign)
             self._resources = stack.pop_all()
 
@@ -65,7 +64,7 @@ class Executor:
     def status(self) -> Status:
         """How the campaign stands."""
         with residence.robot_errors():
-            return status(self._journal, Process.current(), self._gate)
+            return status(self._journal, Process.current(), self._campaign.gate)
 
     def close(self) -> None:
         """Stops the robot and lets another process execute the campaign."""
@@ -88,7 +87,7 @@ def _hold_robot(home: RobotHome, folder: Path) -> Iterator[None]:
     while True:
         with ExitStack() as stack:
             try:
-                stack.enter_context(home.hold(holder_facts(folder, socket.gethostname())))
+                stack.enter_context(home.hold({"campaign": str(folder), **asdict(Process.current())}))
             except RobotHeld:
                 if time.monotonic() >= deadline:
                     raise
@@ -106,28 +105,26 @@ def _journal(plan: CampaignPlan) -> Journal:
     return opened
 
 
-def _campaign(plan: CampaignPlan, opened: Journal, home: RobotHome) -> tuple[Campaign, Gate]:
-    identity = opened.identity  # a campaign of before keeps its version of draws
-    setup, known = setups.load(identity.setup), robots.find(identity.robot)
-    limits = residence.limits_of(home, simulated=known.simulated)
-    robot = known.connect(identity.seed, plan.pace, home, limits)
-    gate = Gate(home, limits, plan.folder, robot)
-    return (
-        Campaign(
-            journal=opened,
-            robot=robot,
-            gate=gate,
-            proposals=Proposals.of(identity, setup, plan.model, plan.candidates),
-            dimensions=setup.dimensions,
-            process=asdict(Process.current()),
-            versions=library_versions(),
-        ),
-        gate,
-    )
-
-
-def _require_own(gate: Gate, opened: Journal) -> None:
-    """Refuse a folder that was copied, restored or rolled back."""
+def _gate(plan: CampaignPlan, opened: Journal, home: RobotHome) -> Gate:
+    """The gate before the robot; it refuses a folder that was copied, restored or rolled back."""
+    known = robots.find(opened.identity.robot)
+    gate = Gate(home, residence.limits_of(home, simulated=known.simulated), plan.folder)
     events = opened.events()
     granted = any(event.new is State.GRANTED for event in events)
     gate.require(opened.name, {event.hash for event in events}, granted)
+    return gate
+
+
+def _campaign(plan: CampaignPlan, opened: Journal, gate: Gate) -> Campaign:
+    identity = opened.identity  # a campaign of before keeps its version of draws
+    setup = setups.load(identity.setup)
+    robot = robots.find(identity.robot).connect(identity.seed, plan.pace, gate.home, gate.limits)
+    return Campaign(
+        journal=opened,
+        robot=robot,
+        gate=replace(gate, robot=robot),
+        proposals=Proposals.of(identity, setup, plan.model, plan.candidates),
+        dimensions=setup.dimensions,
+        process=asdict(Process.current()),
+        versions=library_versions(),
+    )

@@ -1,6 +1,5 @@
 """What must be true of a robot before a trial may move it, and what its ledger is told of that."""
 
-import os
 from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -156,16 +155,3 @@ class Gate:
             "the robot may have done already. Go on in the folder that has that trial. If it is lost, begin "
             "a new campaign in another folder"
         )
-
-
-def holder_facts(campaign: Path, machine: str) -> dict[str, Any]:
-    """What others are told of the process that has a robot.
-
-    Args:
-        campaign: folder of the campaign.
-        machine: name of the computer.
-
-    Returns:
-        Plain values.
-    """
-    return {"campaign": str(campaign), "pid": os.getpid(), "host": machine}

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from workers.hardware.driver import Measurement, Motion
+from workers.host.durable import sync_folder
 
 FILE = "starts.jsonl"
 """The ledger has this name in the folder of a campaign, whatever the robot."""
@@ -81,7 +82,7 @@ class MotionLedger:
             file.flush()
             os.fsync(file.fileno())
         if is_new:
-            _sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
 
 
 def _parse(line: bytes) -> dict[str, Any] | None:
@@ -90,12 +91,3 @@ def _parse(line: bytes) -> dict[str, Any] | None:
     except ValueError:
         return None
     return entry if isinstance(entry, dict) else None
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes a new file's name durable, not only its bytes."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -1,10 +1,9 @@
 """What a robot's ledger says of trials."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from workers.hardware.driver import Measurement, Motion, RobotFault
+from workers.hardware.driver import Measurement, Motion
 from workers.host.ledger import CUT, Ledger
 from workers.host.serve import BROKEN, ENDED, STARTED
 
@@ -46,12 +45,12 @@ def measurement_of(facts: Mapping[str, Any], seconds: float) -> Measurement:
         The measurement.
 
     Raises:
-        RobotFault: the objective is not finite.
+        ValueError: they are no measurement.
     """
-    f = float(facts["f"])
-    if not math.isfinite(f):
-        raise RobotFault(f"the robot measured no objective, but {f}")
-    evidence = str(facts["evidence"])
     return Measurement(
-        f, float(facts["y"]), str(facts.get("stop", "")), float(facts.get("seconds", seconds)), evidence
+        f=float(facts["f"]),
+        y=float(facts["y"]),
+        stop=str(facts.get("stop", "")),
+        seconds=float(facts.get("seconds", seconds)),
+        evidence=str(facts["evidence"]),
     )

@@ -1,7 +1,8 @@
 """The rehearsal robot: a simulated setup with hidden physics that stands in for the real one."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, ClassVar, Final
 
@@ -104,15 +105,15 @@ class RehearsalMachine(RobotMachine):
         return self._steps
 
 
-class _faults:  # noqa: N801 - reads as a sentence after `with`
+@contextmanager
+def _faults() -> Iterator[None]:
     """A setup's code that fails is a fault: a simulation that broke off stands still."""
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, Exception) and not isinstance(error, Fault):
-            raise Fault(describe(error)) from error
+    try:
+        yield
+    except Fault:
+        raise
+    except Exception as error:
+        raise Fault(describe(error)) from error
 
 
 def _host_channel(channel: Channel) -> HostChannel:

@@ -3,7 +3,8 @@
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Any
 
 from workers.host.guard import Guard, now
@@ -28,14 +29,16 @@ class Pulse:
         last_command: when the last one was sent, in s of `now`; 0 before the first.
         commands: how many were sent in this motion.
         late: how many of them came more than a period after their time.
-        came_to_rest: whether the machine was told to stop since.
+        over: whether the motion under way has ended, however it did.
+        at_rest: whether the robot stands still; not where its driver failed to stop it.
     """
 
     moving: bool = False
     last_command: float = 0.0
     commands: int = 0
     late: int = 0
-    came_to_rest: "threading.Event | None" = None
+    over: threading.Event = field(default_factory=threading.Event)
+    at_rest: bool = True
 
 
 def run(
@@ -62,16 +65,19 @@ def run(
     machine.begin(x)
     guard.beat = now()  # getting ready may take any time, and moves nothing
     pulse.commands = pulse.late = 0
-    pulse.came_to_rest = threading.Event()
-    pulse.moving = True
+    pulse.over = threading.Event()
+    pulse.moving, pulse.at_rest = True, False
     try:
         _stream(machine, watch, guard, pulse, period)
     except Exception as error:
         _bring_to_rest(machine, error)
+        pulse.at_rest = True
         raise
+    else:
+        pulse.at_rest = True
     finally:
         pulse.moving = False
-        pulse.came_to_rest.set()
+        pulse.over.set()
     return machine.end()
 
 
@@ -118,11 +124,12 @@ def watch_over(guard: Guard, pulse: Pulse, machine: RobotMachine, give_up: Calla
     while True:
         time.sleep(_LOOK_SECONDS)
         found = guard.objection() if pulse.moving else ""
-        rest = pulse.came_to_rest
-        if not found or rest is None or rest.wait(_GRACE_SECONDS):
+        over = pulse.over
+        if not found or over.wait(_GRACE_SECONDS):
             continue
-        machine.stop()
-        if not rest.wait(_GIVE_UP_SECONDS):
+        with suppress(Exception):  # the thread of the motion tells that; this one must live on
+            machine.stop()
+        if not over.wait(_GIVE_UP_SECONDS):
             give_up(found)
 
 

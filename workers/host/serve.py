@@ -126,10 +126,18 @@ class Host:
             _require_measurement(measured)
             ledger.append(ENDED, {"trial": trial, "measurement": measured, **self._commands()})
         except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
-            what, reason = _meaning_of(error)
-            ledger.append(BROKEN, {"trial": trial, "what": what, "reason": reason, **self._commands()})
+            what, reason = self._note_break(trial, *_meaning_of(error))
             return {"say": what, "trial": trial, "reason": reason}
         return {"say": "ended", "trial": trial, "measurement": measured, **self._commands()}
+
+    def _note_break(self, trial: str, what: str, reason: str) -> "tuple[str, str]":
+        """Tell the ledger how a motion ended; where it takes no more, nobody knows what the robot did."""
+        try:
+            facts = {"trial": trial, "what": what, "reason": reason, **self._commands()}
+            self.home.ledger.append(BROKEN, facts)
+        except (OSError, LedgerDamaged) as error:
+            return "broke", f"{reason}; and the ledger could not be written: {error}"
+        return what, reason
 
     def _not_yet(self, trial: str) -> str:
         """Why a trial must not start at all."""

@@ -26,6 +26,7 @@ class Answer:
     Attributes:
         reached: whether a host answered.
         moving: whether a motion was under way.
+        at_rest: whether the driver brought the robot to rest.
         last_command: when the host sent its last command, in s of `guard.now`; 0 for none.
         rest: what the robot's motors do after a stop, as its driver declares.
         pid: of the host; 0 where none answered.
@@ -33,6 +34,7 @@ class Answer:
 
     reached: bool
     moving: bool = False
+    at_rest: bool = False
     last_command: float = 0.0
     rest: str = ""
     pid: int = 0
@@ -125,9 +127,9 @@ def _answer(
     with suppress(OSError, ValueError, TypeError, KeyError):
         asked = json.loads(connection.recv(_LONGEST))
         guard.why = str(Stop(str(asked["who"]), str(asked["reason"])))
-    if was_moving and pulse.came_to_rest is not None:
-        pulse.came_to_rest.wait(_REST_SECONDS)
-    answer = {"moving": was_moving, "last_command": pulse.last_command or 0.0, **facts()}
+    if was_moving:
+        pulse.over.wait(_REST_SECONDS)
+    answer = {"moving": was_moving, "at_rest": pulse.at_rest, "last_command": pulse.last_command, **facts()}
     connection.sendall(json.dumps(answer).encode() + b"\n")
 
 

@@ -117,7 +117,12 @@ def _note(home: RobotHome, event: str, facts: dict[str, str]) -> None:
 
 def _advice(home: RobotHome, answer: Answer, killed: bool) -> str:  # noqa: FBT001
     rest = home.read_host().get("rest", {})
-    again = f"It stays stopped until: svaedc hardware clear {home.robot} --who NAME --note TEXT"
+    again = (
+        f"It stays stopped until: svaedc hardware clear {home.robot} --home {home.path} "
+        "--who NAME --note TEXT"
+    )
+    if answer.reached and not answer.at_rest:
+        return f"the robot's driver could not stop it: USE THE ROBOT'S OWN EMERGENCY STOP. {again}"
     if answer.reached:
         return f"the robot's host has stopped; its motors {answer.rest}. {again}"
     if killed:

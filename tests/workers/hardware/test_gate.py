@@ -29,7 +29,10 @@ def test_a_folder_whose_journal_has_every_grant_goes_on(gate):
     gate.require("desk-1", set(), granted=False)
     gate.grant("desk-1", "desk-1-000", "a" * 64)
     gate.grant("desk-2", "desk-2-000", "c" * 64)
+    before = gate.home.ledger.entries()
     gate.require("desk-1", {"a" * 64, "b" * 64}, granted=True)
+    assert [entry.event for entry in gate.home.ledger.entries()] == ["granted", "granted"]
+    assert gate.home.ledger.entries() == before
 
 
 def test_a_copy_a_backup_and_a_roll_back_are_refused_naming_the_trial_they_miss(gate):

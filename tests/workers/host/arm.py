@@ -15,8 +15,9 @@ class Arm(RobotMachine):
 
     rest = Rest(stop="hold", kill="sag", silence="go on", disconnect="drop")
 
-    def __init__(self, log, trouble="", at=10, steps=STEPS, kill="sag", seed=0):
+    def __init__(self, log, trouble="", at=10, steps=STEPS, kill="sag", seed=0, ledger=""):
         del seed  # nothing is hidden here
+        self._ledger = ledger
         self.rest = Rest(stop="hold", kill=kill, silence="go on", disconnect="drop")
         self.period = PERIOD
         self.channels = tuple(HostChannel(f"joint{number}", "position", "rad") for number in (1, 2))
@@ -73,6 +74,9 @@ class Arm(RobotMachine):
             raise OSError("the bus is gone")
 
     def end(self):
+        if self._trouble == "fills the disk":
+            os.rename(self._ledger, f"{self._ledger}.away")  # noqa: PTH104
+            os.mkdir(self._ledger)  # noqa: PTH102 - nothing can be added to a folder
         if self._trouble == "measures nothing":
             return {"f": float("nan"), "y": 0.25, "stop": "", "evidence": "a" * 64}
         if self._trouble == "measures badly":

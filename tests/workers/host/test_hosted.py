@@ -87,6 +87,7 @@ def test_a_stop_reaches_a_motion_at_once_and_holds_until_it_is_cleared(arm, home
     thread.join()
     assert answer.reached
     assert answer.moving
+    assert answer.at_rest
     assert answer.rest == "hold"
     assert answer.last_command == pytest.approx(commands(log)[-1], abs=0.05)
     assert commands(log)[-1] <= asked + 0.2
@@ -326,3 +327,20 @@ def test_a_host_that_does_not_answer_is_not_waited_for_for_ever(arm, home, log, 
     assert is_alive(host) is survives
     if survives:
         os.kill(host, signal.SIGKILL)
+
+
+def test_a_motion_that_the_ledger_cannot_take_is_unknown_and_never_called_unmoved(arm, home, log):
+    robot = arm("fills the disk", period=0.0, ledger=os.fspath(home.ledger.path))
+    with pytest.raises(RobotBroke, match="and the ledger could not be written"):
+        robot.run("desk-0", X)
+    assert len(commands(log)) == STEPS
+
+
+def test_a_stop_that_the_driver_cannot_follow_is_not_called_rest(arm, home, log):
+    robot = arm("cannot stop", at=2000, steps=2000)
+    thread, outcome = in_background(robot.run, "desk-0", X)
+    wait_for(lambda: len(commands(log)) > 3)
+    answer = stop.request(home, ADA)
+    thread.join()
+    assert (answer.reached, answer.at_rest) == (True, False)
+    assert isinstance(outcome[0], RobotBroke)
