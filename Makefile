@@ -30,7 +30,7 @@ demo: $(STAMP) ## the whole pipeline, small and real: collect, train, compare
 DRIVERS := tests/cluster/comparison tests/cluster/hardware tests/cluster/training
 COMMANDS := tests/cluster tests/end_to_end
 LOGS := .pytest_cache
-test: $(STAMP) ## the tests that take seconds each
+test: $(STAMP) ## tests of everything, those that take seconds
 	@mkdir -p $(LOGS)
 	@$(BIN)/python -m pytest tests $(COMMANDS:%=--ignore=%) > $(LOGS)/computing.log 2>&1 & computing=$$!; \
 	$(BIN)/python -m pytest $(DRIVERS) > $(LOGS)/drivers.log 2>&1 & drivers=$$!; \
@@ -41,7 +41,7 @@ test: $(STAMP) ## the tests that take seconds each
 test-docs: $(STAMP) ## run every command of the documentation and compare what it prints; ten minutes
 	$(BIN)/python -m pytest -m documentation
 
-test-slow: $(STAMP) ## the tests that take minutes, and the property tests with fresh examples
+test-slow: $(STAMP) ## the tests that take longer, and the property tests with fresh examples; an hour or two
 	HYPOTHESIS_PROFILE=exploring $(BIN)/python -m pytest -m "slow or hypothesis"
 
 chaos: $(STAMP) ## the tests that kill processes on purpose

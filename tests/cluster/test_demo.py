@@ -92,6 +92,7 @@ def test_a_cluster_too_small_for_any_stage_is_refused_before_the_first(
     assert not (tmp_path / "demo").exists()
 
 
+@pytest.mark.slow
 def test_a_gpu_that_training_will_miss_is_refused_before_the_first_stage(tmp_path, tracking_settings):
     settings = Settings(compare=CompareSettings(slots=1), train=TrainSettings(device="cuda"))
     with pytest.raises(UserError, match=r"train\.device=cuda asks for a GPU"):

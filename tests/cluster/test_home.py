@@ -44,6 +44,7 @@ def test_help_and_settings_need_no_home(homeless):
     assert said.endswith("svaedc-12345\n")
 
 
+@pytest.mark.slow
 def test_runs_are_recorded_without_a_home_or_a_name(homeless, tmp_path):
     said = homeless(
         "from cluster.config import TrackingSettings; from cluster.tracking import open_tracker\n"

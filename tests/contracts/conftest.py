@@ -1,8 +1,10 @@
 """Every setup that ships and the examples of users' own, with a few short episodes of each."""
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +15,20 @@ from workers.rollout import random_episode
 FOLDER = Path(__file__).parents[2] / "examples"
 EXAMPLES = ("two_link_pusher", "cart_pole", "gymnasium_hopper")
 SHORT = 300  # control steps; whole episodes run in the slow tests
+# They share the code of others: make test-slow runs them too.
+ALIKE = ("daisy-11d", "daisy-11d-mujoco", "gymnasium_hopper")
 
 
-@pytest.fixture(scope="module", params=[*sorted(setups.SETUPS), *EXAMPLES])
+def each_setup(fast: Callable[[str], bool]) -> list[Any]:
+    """Every setup that ships and every example, those that are not fast marked as slow."""
+    names = (*sorted(setups.SETUPS), *EXAMPLES)
+    return [name if fast(name) else pytest.param(name, marks=pytest.mark.slow) for name in names]
+
+
+@pytest.fixture(
+    scope="module",
+    params=each_setup(lambda name: name not in ALIKE and not name.endswith("-rehearsal")),
+)
 def whole(request):
     """A setup that ships, or an example of a user's own, found as a user's would be."""
     if request.param == "gymnasium_hopper":

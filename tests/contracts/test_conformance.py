@@ -1,23 +1,13 @@
 """Every setup that ships, and the example of a user's own, passes what `svaedc check` asks of any robot."""
 
-from typing import Any
-
 import pytest
 
-from tests.contracts.conftest import EXAMPLES
-from workers import setups
+from tests.contracts.conftest import each_setup
 from workers.conformance.remark import Severity
 from workers.conformance.sample import FEWEST, sample
 from workers.conformance.suite import CHECKS, find
 
-LONG = ("daisy-11d", "daisy-11d-rehearsal", "daisy-27d", "yumi-rehearsal")
-
-
-def _each_setup() -> list[Any]:
-    return [
-        pytest.param(name, marks=pytest.mark.slow) if name in LONG else name
-        for name in (*sorted(setups.SETUPS), *EXAMPLES)
-    ]
+FAST = ("franka", "yumi-mujoco", "two_link_pusher", "cart_pole")
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +16,7 @@ def looked_at(whole):
         yield taken
 
 
-@pytest.mark.parametrize("whole", _each_setup(), indirect=True, scope="module")
+@pytest.mark.parametrize("whole", each_setup(lambda name: name in FAST), indirect=True, scope="module")
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.name)
 def test_no_check_finds_a_mistake(check, looked_at):
     assert len(looked_at.episodes) >= FEWEST

@@ -49,6 +49,7 @@ def svaedc(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", cwd=folder)
 
 
+@pytest.mark.slow
 def test_a_collection_loses_the_episodes_that_failed_and_no_other(folder, monkeypatch):
     collect = ("collect", "--setup", "deadly", "--episodes", "32", "--dataset", "data", "--seed", SEED)
     done = svaedc(folder, *collect, "--set", "collect.episode_timeout_seconds=3")

@@ -26,6 +26,7 @@ def draw(folder, x: str, out: str):
     return command_line.svaedc("render", "--setup", folder.name, "--x", x, "--out", out, folder=folder)
 
 
+@pytest.mark.slow
 def test_an_example_is_collected_and_drawn_from_its_folder(folder):
     name = folder.name
     done = svaedc(folder, "collect", "--setup", name, "--dataset", "data", "--episodes", "24")

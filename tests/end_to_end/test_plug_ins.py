@@ -113,6 +113,7 @@ def test_a_setup_and_methods_of_others_are_compared_on_ray_and_a_changed_file_is
     assert "(horizon was 3, is 4); put the file back as it was" in again.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

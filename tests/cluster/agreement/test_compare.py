@@ -72,6 +72,7 @@ def test_setups_whose_episodes_do_not_end_are_refused(tmp_path, monkeypatch):
         compare_setups(setups.load("quadratic-30d"), setups.load("failing_walk"), 0, 6, "same", None)
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_or_one_document(tmp_path):
     arguments = ("setups", "compare", "quadratic-30d", "quadratic-30d", "--controllers", "10", "--gap", "0.5")
     printed = command_line.svaedc(*arguments, folder=tmp_path)

@@ -3,6 +3,8 @@
 import re
 import shutil
 
+import pytest
+
 from tests.cluster.cli.command_line import svaedc
 
 
@@ -29,6 +31,7 @@ def test_dataset_info_and_verify_tell_a_whole_dataset_from_a_broken_one(small_da
     assert f"`svaedc dataset repair {broken}` recomputes what is broken" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_gap_is_told_from_damage_and_condemns_no_file(small_dataset, tmp_path):
     gappy = tmp_path / "gappy"
     shutil.copytree(small_dataset, gappy)

@@ -9,6 +9,7 @@ from platform import python_version
 
 import pytest
 
+from cluster.cli.main import main
 from tests.cluster.cli.command_line import svaedc
 
 COMPARE = ("compare", "--setup", "franka", "--out", "out", "--address", "127.0.0.1:1")
@@ -90,16 +91,6 @@ def test_a_mistake_is_one_line_where_no_terminal_is(tmp_path):
             2,
             "cannot read the settings file none.yaml",
         ),
-        (
-            (*COLLECT, "--setup", "franka", "--address", "127.0.0.1:1"),
-            1,
-            "no Ray cluster answers at 127.0.0.1:1",
-        ),
-        (
-            (*COLLECT, "--setup", "franka", "--set", "tracking.uri=sqlite:////proc/none/mlflow.db"),
-            1,
-            "the MLflow store sqlite:////proc/none/mlflow.db cannot be used",
-        ),
         (("dataset", "info", "nowhere"), 1, "nowhere holds no dataset"),
         (("dataset", "verify", "nowhere"), 1, "nowhere holds no dataset"),
         (("hardware", "status", "nowhere"), 1, "nowhere"),
@@ -124,13 +115,35 @@ def test_a_mistake_is_one_line_where_no_terminal_is(tmp_path):
         ((*CANDIDATES, "--also", "yumi"), 2, "franka and yumi cannot run the same controllers"),
     ],
 )
-def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message):
-    result = svaedc(*arguments, folder=tmp_path)
-    assert result.returncode == code, result.stderr
-    assert message in " ".join(result.stderr.replace("│", " ").split())
-    assert "Traceback" not in result.stderr
+def test_a_mistake_is_one_message_and_an_exit_code(tmp_path, arguments, code, message, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["svaedc", *arguments])
+    with pytest.raises(SystemExit) as end:
+        main()
+    said = capfd.readouterr().err
+    assert end.value.code == code, said
+    assert message in " ".join(said.replace("│", " ").split())
+    assert "Traceback" not in said
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--address", "127.0.0.1:1"), "no Ray cluster answers at 127.0.0.1:1"),
+        (
+            ("--set", "tracking.uri=sqlite:////proc/none/mlflow.db"),
+            "the MLflow store sqlite:////proc/none/mlflow.db cannot be used",
+        ),
+    ],
+)
+def test_a_service_that_is_not_there_is_named_in_one_line(tmp_path, arguments, message):
+    result = svaedc(*COLLECT, "--setup", "franka", *arguments, folder=tmp_path)
+    assert result.returncode == 1, result.stderr
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
 def test_a_job_refuses_paths_that_ray_will_delete(tmp_path):
     package = tmp_path / "working_dir_files" / "_ray_pkg_1"
     package.mkdir(parents=True)

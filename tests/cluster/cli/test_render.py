@@ -8,6 +8,7 @@ from tests.cluster.cli.command_line import svaedc
 WIDTH, HEIGHT = 64, 48
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_it_says(tmp_path):
     sizes = ("--width", str(WIDTH), "--height", str(HEIGHT), "--stills", "2")
     result = svaedc(

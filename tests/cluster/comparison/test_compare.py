@@ -10,6 +10,7 @@ from cluster.tracking import open_tracker
 from tests.cluster.comparison.comparing import mlflow_runs, table, untrained
 
 
+@pytest.mark.slow
 def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, tracking_settings):
     out = compared("random,screened-random,svae-dc", models=[untrained(tmp_path / "model")])
     rows = table(out)
@@ -43,6 +44,7 @@ def test_a_comparison_writes_a_table_a_summary_and_figures(compared, tmp_path, t
     assert client.list_artifacts(parent.info.run_id, "figures")
 
 
+@pytest.mark.slow
 def test_the_same_command_again_does_nothing_and_names_the_same_run(compared, tracking_settings, capsys):
     out = compared("random")
     before = {
@@ -56,6 +58,7 @@ def test_the_same_command_again_does_nothing_and_names_the_same_run(compared, tr
     assert (len(parents), len(children)) == (1, 2)
 
 
+@pytest.mark.slow
 def test_more_runs_and_methods_extend_a_comparison(compared, tracking_settings):
     before = table(compared("random", runs=1))
     after = table(compared("random,se", runs=2))
@@ -77,6 +80,7 @@ def test_a_comparison_runs_under_the_gap_it_was_asked_for(compared, tmp_path):
     assert all(one["f"] != other["f"] for one, other in zip(paper, wide, strict=True))
 
 
+@pytest.mark.slow
 def test_an_explicit_gap_is_recorded_by_its_ranges_however_they_are_written(compared):
     out = compared("random", gap="object2_mass=2,object1_friction=0.2:0.40", runs=1)
     level = "object1_friction=0.2:0.4,object2_mass=2.0:2.0"

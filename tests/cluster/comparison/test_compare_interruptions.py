@@ -15,6 +15,7 @@ from cluster.errors import UserError
 from tests.cluster.comparison.comparing import mlflow_runs, table, trial
 
 
+@pytest.mark.slow
 def test_an_interrupted_comparison_goes_on_trial_by_trial_to_the_same_table(compared):
     whole = table(compared())
     out = compared()
@@ -97,6 +98,7 @@ def test_a_full_disk_ends_a_comparison_with_nothing_lost(compared, disk_with_roo
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small file system")
+@pytest.mark.slow
 def test_a_disk_too_full_for_the_figure_keeps_the_trials(compared, disk_with_room_for):
     small = disk_with_room_for("64k")
     with pytest.raises(UserError, match=r"cannot write to .*No space left on device; make room"):

@@ -13,6 +13,7 @@ from tests.cluster.comparison.comparing import table, trial
 
 
 @pytest.mark.parametrize("damage", ["no", "[]", "{}", '{"setup": "franka"}', "\x00"])
+@pytest.mark.slow
 def test_a_damaged_identity_is_refused_naming_its_file(compared, tmp_path, damage):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "comparison.json").write_text(damage)
@@ -21,6 +22,7 @@ def test_a_damaged_identity_is_refused_naming_its_file(compared, tmp_path, damag
     assert (tmp_path / "out" / "comparison.json").read_text() == damage
 
 
+@pytest.mark.slow
 def test_runs_without_their_identity_are_refused(compared, tmp_path):
     (tmp_path / "out" / "runs").mkdir(parents=True)
     append(RunKey("random", 1000).path(tmp_path / "out"), trial(0))
@@ -28,6 +30,7 @@ def test_runs_without_their_identity_are_refused(compared, tmp_path):
         compared("random")
 
 
+@pytest.mark.slow
 def test_two_comparisons_at_once_in_one_folder_are_refused(compared, tmp_path):
     with (
         ComparisonFolder(tmp_path / "out").alone(),
@@ -37,6 +40,7 @@ def test_two_comparisons_at_once_in_one_folder_are_refused(compared, tmp_path):
     assert len(table(compared("random", runs=1))) == 4
 
 
+@pytest.mark.slow
 def test_runs_for_tuning_and_runs_for_reporting_share_no_folder(compared, tmp_path):
     (tmp_path / "out" / "runs").mkdir(parents=True)
     append(RunKey("random", 3).path(tmp_path / "out"), trial(0))
@@ -46,6 +50,7 @@ def test_runs_for_tuning_and_runs_for_reporting_share_no_folder(compared, tmp_pa
         Grid(("random",), seed=999, runs=2)
 
 
+@pytest.mark.slow
 def test_another_comparison_in_the_folder_is_refused_naming_the_difference(compared):
     compared("random", runs=1)
     with pytest.raises(UserError, match="holds a comparison with pool_size 200, not 300"):

@@ -179,6 +179,7 @@ def test_a_stand_in_takes_the_model_of_what_it_stands_in_for_and_of_the_same_cha
         usable(slower, setups.load("yumi"))
 
 
+@pytest.mark.slow
 def test_more_slots_than_cpus_are_refused(compared):
     with pytest.raises(UserError, match="needs 7 CPUs"):
         compared("random", settings=CompareSettings(slots=7, pool_size=200))

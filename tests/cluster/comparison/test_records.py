@@ -55,6 +55,7 @@ def test_a_trial_with_an_objective_has_the_bytes_that_released_versions_wrote(tm
     assert (tmp_path / kept.name).read_bytes() == kept.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_damaged_record_is_refused_naming_its_line(compared):
     path = RunKey("random", 1000).path(compared("random", runs=1))
     path.write_text(path.read_text().replace('"f"', '"g"', 1))

@@ -14,6 +14,7 @@ from cluster.tracking import open_tracker
 from tests.cluster.comparison.comparing import mlflow_runs, table, trial
 
 
+@pytest.mark.slow
 def test_a_store_that_fails_meanwhile_costs_no_run_and_is_caught_up_with(compared, tracking_settings, capsys):
     out = compared("random", runs=1)
     with closing(sqlite3.connect(tracking_settings.uri.removeprefix("sqlite:///"))) as store:

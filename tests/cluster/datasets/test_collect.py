@@ -31,6 +31,7 @@ def test_a_cluster_collects_the_bytes_that_one_process_would(ray_session, tracki
     assert not list((tmp_path / "cluster" / WRITING).iterdir())
 
 
+@pytest.mark.slow
 def test_extending_rewrites_nothing_and_asking_again_does_nothing(
     ray_session, tracking_settings, tmp_path, capsys
 ):
@@ -45,6 +46,7 @@ def test_extending_rewrites_nothing_and_asking_again_does_nothing(
     assert "nothing to do" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_folder_of_another_dataset_is_refused_naming_the_field(ray_session, tracking_settings, tmp_path):
     collected(tmp_path / "dataset", 4, ray_session, tracking_settings)
     with pytest.raises(UserError, match=r"differ in seed: 3 and 4"):
@@ -67,6 +69,7 @@ def test_more_actors_than_cpus_are_refused_before_anything_starts(ray_session, t
         )
 
 
+@pytest.mark.slow
 def test_two_drivers_on_one_dataset_lose_and_double_nothing(ray_session, tracking_settings, tmp_path):
     """And what a living process is writing meanwhile stays.
 

@@ -49,6 +49,7 @@ def test_a_killed_driver_is_continued_to_the_same_bytes(tmp_path):
     assert not list((folder / WRITING).iterdir())
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_cleanly_and_says_how_to_go_on(tmp_path):
     folder, store = tmp_path / "dataset", tmp_path / "mlflow.db"
     with subprocess.Popen(
@@ -64,6 +65,7 @@ def test_ctrl_c_ends_cleanly_and_says_how_to_go_on(tmp_path):
     assert not list((folder / WRITING).iterdir())
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_work_with_nothing_lost(ray_session, tracking_settings, tmp_path):
     small = tmp_path / "small"
     small.mkdir()

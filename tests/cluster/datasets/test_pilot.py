@@ -52,6 +52,7 @@ def did(episodes: int, core_hours: float, bad: float = 0.5) -> CollectionProgres
     )
 
 
+@pytest.mark.slow
 def test_a_pilot_is_the_beginning_of_the_dataset_and_is_judged_at_its_end(
     ray_session, tracking_settings, tmp_path, capsys
 ):

@@ -13,6 +13,7 @@ from workers.dataset.folder import open_dataset
 from workers.dataset.shards import Shard, digest_path
 
 
+@pytest.mark.slow
 def test_a_shard_that_was_put_aside_and_then_collected_by_another_driver_leaves_no_trace(
     ray_session, tracking_settings, tmp_path
 ):
@@ -22,6 +23,7 @@ def test_a_shard_that_was_put_aside_and_then_collected_by_another_driver_leaves_
     assert not errors.exists()
 
 
+@pytest.mark.slow
 def test_a_shard_that_keeps_failing_is_put_aside_until_it_succeeds(
     ray_session, tracking_settings, tmp_path, capsys
 ):
@@ -46,6 +48,7 @@ def test_a_shard_that_keeps_failing_is_put_aside_until_it_succeeds(
     assert dataset.fingerprint() == alone(tmp_path / "alone", 20).fingerprint()
 
 
+@pytest.mark.slow
 def test_episodes_collected_in_other_shards_are_no_longer_put_aside(tmp_path):
     dataset = alone(tmp_path, 8)
     put_aside(dataset, Shard(8, 12), ["an error"])

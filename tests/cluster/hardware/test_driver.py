@@ -120,6 +120,7 @@ def test_a_complete_campaign_is_shown_again_without_motion(ray_session, tracker,
     assert len(starts(tmp_path)) == 2
 
 
+@pytest.mark.slow
 def test_a_killed_actor_leaves_its_trial_unknown_and_it_is_not_repeated(
     ray_session, tracker, settings, tmp_path
 ):
@@ -138,6 +139,7 @@ def test_a_killed_actor_leaves_its_trial_unknown_and_it_is_not_repeated(
     assert len(set(starts(tmp_path))) == len(starts(tmp_path)) == 4
 
 
+@pytest.mark.slow
 def test_a_waiting_campaign_goes_on_when_a_person_approves(ray_session, tracker, settings, tmp_path):
     approvers = [
         when(

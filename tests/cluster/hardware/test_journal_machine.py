@@ -111,6 +111,7 @@ def finished(tmp_path_factory):
 
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
+@pytest.mark.slow
 def test_any_change_of_any_event_is_noticed(finished, data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / journal.FILE

@@ -145,6 +145,7 @@ def test_a_hung_worker_is_replaced_and_stalls_nothing(tmp_path):
     assert any(isinstance(result, Failed) and "longer than 4 s" in result.error for result in results)
 
 
+@pytest.mark.slow
 def test_work_that_was_done_while_the_driver_stood_still_is_not_overdue(tmp_path):
     limits = Limits(in_flight=2, attempts=1, seconds=2.0)
     actor = ray.remote(Worker).options(num_cpus=1)
@@ -176,6 +177,7 @@ def test_actors_that_cannot_start_end_the_work_at_once_with_their_reason():
         list(pool.run(["works-0"]))
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_while_it_starts_is_replaced(tmp_path, capsys):
     actor = ray.remote(Stillborn).options(num_cpus=1)
     with pool_of(lambda: actor.remote(tmp_path), 1, PATIENT) as pool:
@@ -183,6 +185,7 @@ def test_a_worker_that_is_killed_while_it_starts_is_replaced(tmp_path, capsys):
     assert "a worker process cannot start yet" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_crew_that_may_grow_takes_the_cpus_that_become_free_and_no_more_than_there_is_work(tmp_path):
     """One CPU of four is held for ever, two until the work has begun."""
     actor = ray.remote(Worker).options(num_cpus=1)
@@ -210,6 +213,7 @@ def test_a_machine_is_there_while_it_answers():
     assert not is_there("0" * 56)
 
 
+@pytest.mark.slow
 def test_losing_a_worker_in_any_way_that_ray_knows_is_a_failed_attempt(tmp_path):
     """A process killed for want of memory is no death of an actor to Ray, nor is that of a task."""
     crash = ray.remote(die).options(max_retries=0, num_cpus=0)
@@ -238,6 +242,7 @@ def test_no_free_cpu_at_all_ends_the_wait_with_the_reason(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_replacement_that_cannot_start_yet_costs_no_attempt(tmp_path, capsys):
     """The only worker dies, and the machine lets nothing start for a while."""
     limits = Limits(in_flight=2, attempts=2, seconds=1.0)
@@ -250,6 +255,7 @@ def test_a_replacement_that_cannot_start_yet_costs_no_attempt(tmp_path, capsys):
     assert capsys.readouterr().err.count("cannot start yet: OSError: the folder is away") == 1
 
 
+@pytest.mark.slow
 def test_replacements_that_never_start_end_the_work_with_their_reason(tmp_path):
     limits = Limits(in_flight=1, attempts=2, seconds=60.0, start_seconds=10.0)
     actor = ray.remote(Fragile).options(num_cpus=1)

@@ -50,6 +50,7 @@ def test_a_model_in_the_store_is_an_output_of_its_run(path, tracker):
 
 
 @pytest.mark.parametrize("setup", ["franka", "yumi"])
+@pytest.mark.slow
 def test_a_model_that_reads_plans_answers_without_the_code_of_its_robot(setup, tmp_path):
     robot = setups.load(setup)
     torch.manual_seed(0)

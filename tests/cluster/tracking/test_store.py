@@ -85,6 +85,7 @@ def test_a_folder_that_the_systems_encoding_cannot_name_is_refused_with_the_reme
         open_tracker(TrackingSettings())
 
 
+@pytest.mark.slow
 def test_commands_that_create_a_store_at_once_share_one_experiment(tmp_path):
     program = (
         "from cluster.config import TrackingSettings; from cluster.tracking import open_tracker;"

@@ -13,6 +13,7 @@ def test_a_model_that_is_not_finished_says_that_the_command_goes_on(capsys):
     assert "after 40 of 80 updates; the same command goes on" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_training_that_died_before_its_last_record_only_repeats_the_record(run_train, finished, capsys):
     measures = finished.with_name("metrics.json")
     written, trained_at = measures.read_text(), finished.stat().st_mtime_ns
@@ -23,6 +24,7 @@ def test_a_training_that_died_before_its_last_record_only_repeats_the_record(run
     assert "held-out error" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_full_disk_while_recording_is_named_and_loses_nothing(run_train, finished):
     finished.with_name("metrics.json").unlink()
     finished.with_name(".unfinished-metrics.json").symlink_to("/dev/full")

@@ -15,6 +15,7 @@ from cluster.tracking import open_tracker
 from svaedc.model import checkpoint
 
 
+@pytest.mark.slow
 def test_training_leaves_a_model_its_measures_a_picture_and_a_tracked_run(
     run_train, tracking_settings, capsys
 ):
@@ -67,6 +68,7 @@ def test_two_processes_learn_what_one_does(run_train):
     assert measured[0]["rec_norm"] == pytest.approx(measured[1]["rec_norm"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_model_in_mlflow_answers_in_a_fresh_process_without_the_package(
     run_train, finished, tracking_settings, tmp_path
 ):
@@ -117,6 +119,7 @@ def test_a_relative_cache_folder_is_the_driver_s(run_train, monkeypatch, tmp_pat
     assert len(list((tmp_path / "near").glob("*-stride5"))) == 1
 
 
+@pytest.mark.slow
 def test_a_training_may_read_plans(run_train):
     path = run_train("reader", prior="plan", updates=4, epoch_updates=2)
     model, metadata = checkpoint.load(path)

@@ -48,16 +48,19 @@ def test_names_and_folders_that_do_not_exist_are_refused(run_train, tmp_path):
         run_train(folder=tmp_path / "nowhere")
 
 
+@pytest.mark.slow
 def test_too_few_episodes_are_refused_with_the_number_needed(run_train, small_dataset):
     with pytest.raises(UserError, match="holds 16 episodes, training needs at least 200"):
         run_train(folder=small_dataset)
 
 
+@pytest.mark.slow
 def test_more_processes_than_cpus_are_refused_instead_of_hanging(run_train):
     with pytest.raises(UserError, match="needs 8 CPUs"):
         run_train(workers=2, threads=4)
 
 
+@pytest.mark.slow
 def test_a_corrupt_shard_ends_training_before_it_starts(run_train, franka_dataset, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()

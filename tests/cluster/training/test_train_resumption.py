@@ -20,6 +20,7 @@ def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half
     assert same(weights(path), weights(ends["finished"] / "model.pt"))
 
 
+@pytest.mark.slow
 def test_a_training_that_has_no_room_to_go_on_is_tracked_by_no_new_run(
     run_train, half_way, tracking_settings
 ):

@@ -26,6 +26,7 @@ def best_of_run(name, seed, count=12):
 @pytest.mark.parametrize(
     "name", ["se", *(pytest.param(name, marks=pytest.mark.slow) for name in ("matern", "svae"))]
 )
+@pytest.mark.slow
 def test_optimisation_comes_closer_to_the_optimum_than_random_search(name):
     regret = {
         method: np.mean([1 - best_of_run(method, seed) for seed in range(4)]) for method in ("random", name)
@@ -75,6 +76,7 @@ def test_a_method_that_searches_the_cube_suggests_more_controllers_than_its_pool
     assert len(np.unique(history.x, axis=0)) == 4
 
 
+@pytest.mark.slow
 def test_compression_spends_fewer_trials_on_controllers_predicted_bad():
     def mean_badness(name):
         badness = []

@@ -10,10 +10,12 @@ import torch
 from svaedc.model.config import ModelConfig, ScaleBounds
 from svaedc.model.svae_dc import SvaeDc, initialized_model
 
+FAST = (("laplace", "low-rank", "deconv"), ("gaussian", "dense", "mlp"))  # each choice once
 VARIANTS = [
     pytest.param(
         {"distribution": distribution, "head": head, "prior": prior, "trunk": prior},
         id=f"{distribution}-{head}-{prior}",
+        marks=[] if (distribution, head, prior) in FAST else pytest.mark.slow,
     )
     for distribution, head, prior in product(
         ("laplace", "gaussian"), ("low-rank", "dense"), ("mlp", "deconv")

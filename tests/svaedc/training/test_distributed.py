@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import torch
 
 SCRIPT = """
@@ -56,6 +57,7 @@ def test_ranks_end_with_the_same_bits_though_they_see_other_episodes_and_noise(t
     assert all(torch.equal(one[name], other[name]) for name in one)
 
 
+@pytest.mark.slow
 def test_two_processes_take_the_steps_of_one(tmp_path):
     """Stage two without dropout draws no noise, so that only the order of additions differs."""
     [alone] = trained(tmp_path / "alone", world=1, joint=0)

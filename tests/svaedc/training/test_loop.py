@@ -106,6 +106,7 @@ def test_training_raises_the_bound_and_uses_every_latent_dimension(model, halves
     assert last.metrics["held_out/best_loss"] == pytest.approx(metrics["kl"], rel=0.5)
 
 
+@pytest.mark.slow
 def test_training_for_generation_brings_generated_trajectories_closer(small_config, halves, bounds):
     measured = {}
     for weight in (0.0, 10.0):
@@ -143,6 +144,7 @@ IMPATIENT = replace(
 )
 
 
+@pytest.mark.slow
 def test_a_stage_that_no_longer_gets_better_stops_early_and_puts_its_best_epoch_back(model, halves):
     """So small a rate learns nothing; the rounding of each update decides which epoch is best."""
     settings = replace(IMPATIENT, held_out_sample=60, joint=replace(IMPATIENT.joint, updates=400))

@@ -36,6 +36,7 @@ def dataset(franka, tmp_path):
     return created
 
 
+@pytest.mark.slow
 def test_a_graded_dataset_gives_training_its_degrees_and_exact_y(dataset, episode, tmp_path):
     assert [found for _, found in verify(dataset)] == [[], []]
     cache = training_cache(dataset, 5, tmp_path / "cache")
