@@ -173,6 +173,13 @@ class HardwareSettings(Section):
 
     pool_size: PositiveInt = 5000
     """So many candidate controllers are drawn for a campaign; this is part of its identity."""
+    avoid_distance: float = Field(default=0.05, ge=0.0, le=1.0)
+    """No controller is proposed that differs by less than this from one that failed or was rejected: the root
+    mean square over parameters, each in parts of its range. This is part of a campaign's identity."""
+    simulations: NonNegativeInt = 20
+    """What waits for a person's approval is simulated so often for them."""
+    clip: Literal["gif", "mp4", "none"] = "gif"
+    """The first of these simulations is drawn into such a file."""
     namespace: str = Field(default="svaedc", min_length=1)
     """The one hardware actor is in this Ray namespace, the same for everybody who shares the robot."""
 

@@ -23,6 +23,8 @@ class Stream(StrEnum):
     """The random controllers that a run begins with; the index is that of the trial."""
     SUGGESTION = "suggestion"
     """What a method draws for a suggestion; the index is that of the trial."""
+    PREVIEW = "preview"
+    """The physics of a simulation that shows a person what a trial may do; the index is its own."""
     BOOTSTRAP = "bootstrap"
     """The resamples of a summary; the index is 0."""
 

@@ -96,12 +96,15 @@ class Steps:
         if self._setup.stop is not never:
             self._reason = self._setup.stop(self._environment.observed(self._records[-1:]))
 
+    def observations(self) -> Observed:
+        """What was seen of the steps so far; at least one was made."""
+        records = self._records
+        seen = self._environment.observed(records)
+        return check_observed(seen, self._setup.observation, len(records), self._setup.name)
+
     def episode(self) -> Episode:
         """What the steps so far were worth; at least one was made."""
-        setup, records = self._setup, self._records
-        observed = self._environment.observed(records)
-        checked = check_observed(observed, setup.observation, len(records), setup.name)
-        return _episode(setup, checked, self._reason, self._x, self._physics)
+        return _episode(self._setup, self.observations(), self._reason, self._x, self._physics)
 
 
 def draw(setup: Setup, seed: int, index: int, repeats: int = 1) -> tuple[Float32[np.ndarray, " d"], Physics]:

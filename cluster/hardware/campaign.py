@@ -1,80 +1,28 @@
 """A hardware campaign: which step comes next, and that each is in the journal before the robot feels it."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.journal import Journal
+from cluster.hardware.record.first_trials import FirstTrial
 from cluster.hardware.robot.approvals import lapse_of
-from cluster.hardware.states import TERMINAL, State
-from cluster.hardware.status import RANDOM_TRIALS, Phase, RobotGate, phase_at, phase_of
+from cluster.hardware.robot.gateway import CampaignGate, Proposer
+from cluster.hardware.states import IMPORTED, TERMINAL, State
+from cluster.hardware.status import RANDOM_TRIALS, Phase, phase_at, phase_of
 from svaedc.bo.history import History
-from workers.hardware.driver import Motion, RobotBroke, RobotDriver, RobotFault, RobotStopped
+from workers.hardware.driver import RobotBroke, RobotDriver, RobotFault, RobotStopped
 from workers.user_code import describe
 
 
-@runtime_checkable
-class Proposer(Protocol):
-    """Where controllers come from; a pure function of the campaign's identity and its arguments."""
-
-    def random(self, index: int) -> np.ndarray:
-        """The random controller, [D], of one of the first trials."""
-        ...
-
-    def suggest(self, history: History, index: int) -> np.ndarray:
-        """The controller, [D], of a later trial.
-
-        Args:
-            history: what was measured.
-            index: of the trial.
-
-        Returns:
-            A point of the unit cube.
-        """
-        ...
-
-    def predict(self, x: np.ndarray) -> float | None:
-        """Badness of a controller in [0, 1] as the model expects it; None without a model."""
-        ...
-
-
-@runtime_checkable
-class CampaignGate(RobotGate, Protocol):
-    """What must be true of the robot before a trial may move it; see `workers.hardware.gate.Gate`."""
-
-    def grant(self, campaign: str, trial_id: str, journal: str) -> None:
-        """Tell the robot's ledger which journal lets a trial move it.
-
-        Args:
-            campaign: its name.
-            trial_id: of the trial.
-            journal: hash of the event that granted it.
-        """
-        ...
-
-    def motion(self, trial_id: str) -> Motion:
-        """What the robot's ledger says of a trial."""
-        ...
-
-    def plan(self, trial_id: str, x: np.ndarray) -> Mapping[str, Any]:
-        """Let the robot plan a controller; nothing moves.
-
-        Args:
-            trial_id: of the trial.
-            x: the controller, [D], in [0, 1].
-
-        Returns:
-            What it will ask of the robot, with an `objection` where it must not run.
-        """
-        ...
-
-    def approval(self) -> Mapping[str, Any]:
-        """What an approval is bound to, besides the controller."""
-        ...
+def _nothing(trial: int, x: np.ndarray) -> Mapping[str, Any]:  # noqa: ARG001
+    """Nobody has to be shown anything."""
+    return {}
 
 
 @dataclass(frozen=True)
@@ -89,6 +37,8 @@ class Campaign:
         dimensions: D of the robot's setup.
         process: the host, boot and process id that act, kept as evidence.
         versions: of the libraries that compute proposals, kept as evidence.
+        first: trials that another campaign measured; they take the place of the first random ones.
+        foresee: what a person is shown of a trial, by its number and controller, before they approve it.
     """
 
     journal: Journal
@@ -98,6 +48,8 @@ class Campaign:
     dimensions: int
     process: Mapping[str, Any]
     versions: Mapping[str, str]
+    first: tuple[FirstTrial, ...] = ()
+    foresee: Callable[[int, np.ndarray], Mapping[str, Any]] = _nothing
 
 
 def advance(campaign: Campaign) -> Phase:
@@ -218,8 +170,10 @@ def propose(campaign: Campaign) -> CampaignTrial:
     """Stores the next controller, a function of the journal alone: a kill before or after changes nothing."""
     trials = campaign.journal.trials()
     number, past = len(trials), history(trials, campaign.dimensions)
+    if number < len(campaign.first):
+        return _propose_again(campaign, number, campaign.first[number])
     if len(past) < RANDOM_TRIALS:
-        kind, x = "random", campaign.proposals.random(number)
+        kind, x = "random", campaign.proposals.random(past, number)
     else:
         kind, x = "suggested", campaign.proposals.suggest(past, number)
     facts = {
@@ -231,14 +185,33 @@ def propose(campaign: Campaign) -> CampaignTrial:
     return campaign.journal.trial(number)
 
 
+def _propose_again(campaign: Campaign, number: int, shared: FirstTrial) -> CampaignTrial:
+    """A controller that another campaign has tried already, with what it measured."""
+    facts = {"campaign": shared.campaign, "trial": shared.number, "f": shared.f, "y": shared.y}
+    campaign.journal.propose(number, shared.x, IMPORTED, "campaign", {IMPORTED: facts})
+    return campaign.journal.trial(number)
+
+
+def _take_over(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
+    """Nothing moves: the other campaign's measurement counts here too."""
+    facts = json.loads(campaign.journal.last_event(trial.number).body)[IMPORTED]
+    return record(campaign.journal, trial, State.MEASURED, f"campaign: {facts['campaign']}", facts)
+
+
 def _check(campaign: Campaign, trial: CampaignTrial) -> CampaignTrial:
+    if trial.kind == IMPORTED:
+        return _take_over(campaign, trial)
     reason = objection(trial.x, campaign.dimensions)
     if reason is not None:
         return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": reason})
     plan = campaign.gate.plan(trial_id(campaign.journal, trial), trial.x)
     if plan.get("objection"):
         return record(campaign.journal, trial, State.REJECTED, "limits", {"reason": plan["objection"]})
-    facts = {"predicted_y": campaign.proposals.predict(trial.x), "plan": dict(plan)}
+    facts = {
+        "predicted_y": campaign.proposals.predict(trial.x),
+        "plan": dict(plan),
+        **campaign.foresee(trial.number, trial.x),
+    }
     return record(campaign.journal, trial, State.CHECKED, "limits", facts)
 
 

@@ -14,7 +14,7 @@ SCHEMA = (
        robot TEXT NOT NULL, setup TEXT NOT NULL, method TEXT NOT NULL, seed INTEGER NOT NULL,
        model TEXT NOT NULL, pool INTEGER NOT NULL, trials INTEGER NOT NULL,
        approval TEXT NOT NULL, draws INTEGER NOT NULL, codes TEXT NOT NULL,
-       candidates TEXT NOT NULL) STRICT""",
+       candidates TEXT NOT NULL, avoid REAL NOT NULL, first TEXT NOT NULL) STRICT""",
     """CREATE TABLE IF NOT EXISTS event (seq INTEGER PRIMARY KEY, trial INTEGER NOT NULL, old TEXT,
        new TEXT NOT NULL, at TEXT NOT NULL, who TEXT NOT NULL, idem TEXT NOT NULL UNIQUE,
        body TEXT NOT NULL, prev TEXT NOT NULL, hash TEXT NOT NULL UNIQUE) STRICT""",

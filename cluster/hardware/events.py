@@ -78,7 +78,7 @@ class CampaignTrial:
         number: in its campaign, from 0.
         robot: that runs it.
         state: the last event's.
-        kind: "random" or "suggested".
+        kind: "random", "suggested" or "imported".
         x_hex: controller as little-endian float64 in hexadecimal.
         sha256: of the controller's bytes.
         f: objective, once measured.

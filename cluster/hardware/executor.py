@@ -1,22 +1,28 @@
 """The one process that carries a campaign out: it holds the robot, the campaign's folder and its journal."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
+
+import numpy as np
 
 from cluster.errors import UserError
 from cluster.hardware import campaign, journal
 from cluster.hardware.campaign import Campaign
 from cluster.hardware.events import utc_now
+from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.plan import CampaignPlan
 from cluster.hardware.proposals import Proposals, library_versions
+from cluster.hardware.record import attachments
 from cluster.hardware.robot import residence
-from cluster.hardware.states import State
+from cluster.hardware.states import TERMINAL, Approval, State
 from cluster.hardware.status import Status, status
 from workers import setups
 from workers.hardware import robots
@@ -53,18 +59,28 @@ class Executor:
             self._campaign = _campaign(plan, self._journal, gate)
             stack.callback(self._campaign.robot.stop)
             campaign.recover(self._campaign)
+            self._home = home
+            self._take_over_records()
             self._resources = stack.pop_all()
 
     def advance(self) -> Status:
         """Goes on until one trial has ended, or until only a person, or time, lets it go on."""
         with residence.robot_errors():
             campaign.advance(self._campaign)
+            self._take_over_records()
             return self.status()
 
     def status(self) -> Status:
         """How the campaign stands."""
         with residence.robot_errors():
             return status(self._journal, Process.current(), self._campaign.gate)
+
+    def _take_over_records(self) -> None:
+        """What was recorded at the robot of trials that have ended, whichever process ran them."""
+        for trial in self._journal.trials():
+            name = campaign.trial_id(self._journal, trial)
+            if trial.state in TERMINAL or trial.state is State.UNKNOWN:
+                attachments.take_over(self.plan.folder, self._home.trials / name, trial.number)
 
     def close(self) -> None:
         """Stops the robot and lets another process execute the campaign."""
@@ -115,6 +131,15 @@ def _gate(plan: CampaignPlan, opened: Journal, home: RobotHome) -> Gate:
     return gate
 
 
+def _foresight(
+    plan: CampaignPlan, identity: CampaignIdentity
+) -> Callable[[int, np.ndarray], Mapping[str, Any]]:
+    """What the person who approves is shown; where nobody approves, nothing."""
+    if identity.approval is not Approval.OPERATOR:
+        return lambda _, __: {}
+    return partial(plan.foresight.of, plan.folder, identity.setup, identity.seed)
+
+
 def _campaign(plan: CampaignPlan, opened: Journal, gate: Gate) -> Campaign:
     identity = opened.identity  # a campaign of before keeps its version of draws
     setup = setups.load(identity.setup)
@@ -127,4 +152,6 @@ def _campaign(plan: CampaignPlan, opened: Journal, gate: Gate) -> Campaign:
         dimensions=setup.dimensions,
         process=asdict(Process.current()),
         versions=library_versions(),
+        first=plan.first,
+        foresee=_foresight(plan, identity),
     )

@@ -35,6 +35,9 @@ class CampaignIdentity:
         codes: SHA-256 of the files of a user's own setup and method by their names, as JSON; "" where both
             ship, and of campaigns that began before there was such a field.
         candidates: SHA-256 of the table of simulated candidates that it chooses among; "" for none.
+        avoid: root mean square difference of parameters, in [0, 1]; nothing nearer than this to a controller
+            that failed or was rejected is proposed. 0 avoids that controller alone; campaigns of before do.
+        first: SHA-256 of the first trials that it shares with another campaign; "" where it has its own.
     """
 
     robot: str
@@ -48,6 +51,8 @@ class CampaignIdentity:
     draws: int = 1
     codes: str = ""
     candidates: str = ""
+    avoid: float = 0.0
+    first: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -56,6 +61,8 @@ class CampaignIdentity:
             raise ValueError(f"pool must be at least 1, got {self.pool}")
         if self.trials < 0:
             raise ValueError(f"trials must be at least 0, got {self.trials}")
+        if not 0.0 <= self.avoid <= 1.0:
+            raise ValueError(f"avoid must lie in [0, 1], got {self.avoid}")
 
     def genesis(self, name: str) -> str:
         """Hash that the first event of the campaign called `name` follows."""
@@ -77,7 +84,8 @@ class CampaignIdentity:
         """
         if self.codes and asked.codes:
             self._require_codes(asked, place)
-        for field, here in asdict(replace(self, draws=asked.draws, codes=asked.codes)).items():
+        kept = replace(self, draws=asked.draws, codes=asked.codes, avoid=self.avoid or asked.avoid)
+        for field, here in asdict(kept).items():
             there = getattr(asked, field)
             if here != there:
                 raise IdentityMismatch(
@@ -95,4 +103,4 @@ class CampaignIdentity:
                 )
 
 
-_BEFORE = (("draws", 1), ("codes", ""), ("candidates", ""))
+_BEFORE = (("draws", 1), ("codes", ""), ("candidates", ""), ("avoid", 0.0), ("first", ""))

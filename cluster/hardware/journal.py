@@ -23,7 +23,7 @@ from cluster.hardware.events import (
     replay,
 )
 from cluster.hardware.identity import CampaignIdentity
-from cluster.hardware.states import LEGAL, Approval, State, is_legal
+from cluster.hardware.states import Approval, State, legal
 
 FILE = "journal.sqlite"
 EVENT_COLUMNS = ", ".join(field.name for field in fields(Event))
@@ -88,7 +88,7 @@ class Journal:
         Args:
             number: of the trial, from 0.
             x: the controller.
-            kind: "random" or "suggested".
+            kind: "random", "suggested" or "imported".
             who: proposes it.
             facts: what the proposal was computed from.
 
@@ -126,8 +126,9 @@ class Journal:
                 return _repeat(known[0], number, new, who, canonical(body))
             trial = self._trial(number)
             old = trial.state if trial else None
-            if not is_legal(old, new):
-                raise IllegalTransition(_forbidden(number, old, new))
+            allowed = legal(old, trial.kind if trial else "")
+            if new not in allowed:
+                raise IllegalTransition(_forbidden(number, old, new, allowed))
             seq, prev = self._head()
             at = self._clock().isoformat()
             event = Event(seq + 1, number, old, new, at, who, idem, canonical(body), prev, "").seal()
@@ -194,7 +195,7 @@ class Journal:
         if not self._connection.execute("SELECT 1 FROM sqlite_master").fetchone():
             raise _absent(self.path)
         try:
-            # Journals of svaedc 0.1.0 have none of `draws`, `codes` and `candidates`.
+            # Journals of svaedc 0.1.0 have nothing behind `approval`.
             row = self._connection.execute("SELECT * FROM campaign").fetchone()
             if row is None:
                 raise corrupt(self.path, "it names no campaign")
@@ -261,9 +262,9 @@ def _repeat(event: Event, number: int, new: State, who: str, body: str) -> Event
     return event
 
 
-def _forbidden(number: int, old: State | None, new: State) -> str:
-    legal = ", ".join(sorted(LEGAL[old])) or "nothing, it has ended"
-    return f"trial {number} cannot go from {old or 'not existing'} to {new}; legal from there: {legal}"
+def _forbidden(number: int, old: State | None, new: State, allowed: frozenset[State]) -> str:
+    names = ", ".join(sorted(allowed)) or "nothing, it has ended"
+    return f"trial {number} cannot go from {old or 'not existing'} to {new}; legal from there: {names}"
 
 
 def _trial(row: tuple[Any, ...]) -> CampaignTrial:

@@ -1,19 +1,16 @@
-"""What a person does to a campaign in a folder: look, approve, reject, resolve, amend, export."""
+"""What a person does to a campaign in a folder: look, approve, reject, resolve, amend, attach."""
 
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
 
-from cluster.errors import UsageError, UserError
-from cluster.hardware import campaign, journal, lock
-from cluster.hardware.events import CampaignTrial, canonical, utc_now
+from cluster.errors import UsageError
+from cluster.hardware import campaign, lock
+from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
+from cluster.hardware.record import attachments, opening
+from cluster.hardware.record.attachments import Attachment
 from cluster.hardware.robot import residence
 from cluster.hardware.states import State
 from cluster.hardware.status import Status
@@ -33,7 +30,7 @@ def status(folder: Path) -> Status:
     Raises:
         JournalError: when there is none, or its journal is damaged.
     """
-    with _looking(folder) as opened, residence.robot_errors():
+    with opening.to_read(folder) as opened, residence.robot_errors():
         return look(opened, lock.holder(folder), _gate(folder, opened))
 
 
@@ -55,7 +52,7 @@ def approve(folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES) 
     """
     if not 0 < minutes < float("inf"):
         raise UsageError(f"an approval must hold for some minutes, got {minutes}; give --minutes NUMBER")
-    with _open(folder) as opened, residence.robot_errors():
+    with opening.to_write(folder) as opened, residence.robot_errors():
         until = utc_now() + timedelta(minutes=minutes)
         bounds = {"limits": _gate(folder, opened).approval()["limits"], "until": until.isoformat()}
         return campaign.approve(opened, opened.trial(trial), _require_name(who), bounds)
@@ -75,7 +72,7 @@ def withdraw(folder: Path, trial: int, who: str) -> CampaignTrial:
     Raises:
         IllegalTransition: when the trial is not approved, or was granted already.
     """
-    with _open(folder) as opened:
+    with opening.to_write(folder) as opened:
         facts = {"reason": "the approval was withdrawn"}
         return campaign.record(opened, opened.trial(trial), State.CHECKED, _require_name(who), facts)
 
@@ -98,7 +95,7 @@ def reject(folder: Path, trial: int, who: str, note: str) -> CampaignTrial:
     """
     if not note.strip():
         raise UsageError("a rejection needs a note that says why, got nothing; give --note TEXT")
-    with _open(folder) as opened:
+    with opening.to_write(folder) as opened:
         facts = {"reason": note.strip()}
         return campaign.record(opened, opened.trial(trial), State.REJECTED, _require_name(who), facts)
 
@@ -115,7 +112,7 @@ def adopt(folder: Path, who: str, home: Path | None) -> None:
         UserError: when the robot's home cannot be written.
     """
     name = _require_name(who)
-    with _open(folder) as opened, residence.robot_errors():
+    with opening.to_write(folder) as opened, residence.robot_errors():
         found = residence.enter(folder, opened.identity.robot, home)
         Gate(found, residence.limits_of(found, simulated=True), folder).adopt(opened.name, name)
 
@@ -152,7 +149,7 @@ def resolve(
     """
     new, body = _resolution(outcome, note, f, y)
     close_abandoned(folder, patience=0.0)
-    with _open(folder) as opened:
+    with opening.to_write(folder) as opened:
         _require_possible(opened, f, confirmed)
         return campaign.record(opened, opened.trial(trial), new, _require_name(who), body)
 
@@ -177,7 +174,7 @@ def amend(
     Raises:
         UsageError: when an argument is missing or out of its range, or the trial was not measured.
     """
-    with _looking(folder) as opened:
+    with opening.to_read(folder) as opened:
         state = opened.trial(trial).state
     if state is not State.MEASURED:
         raise UsageError(
@@ -196,7 +193,7 @@ def close_abandoned(folder: Path, patience: float) -> None:
     Raises:
         FolderTaken: when it is alive.
     """
-    with _open(folder) as opened, residence.robot_errors():
+    with opening.to_write(folder) as opened, residence.robot_errors():
         running = [trial for trial in opened.trials() if trial.state is State.RUNNING]
         if running:
             with FolderLock(folder, patience):
@@ -206,36 +203,28 @@ def close_abandoned(folder: Path, patience: float) -> None:
                     campaign.record(opened, trial, State.UNKNOWN, "recovery", facts)
 
 
-def export(folder: Path) -> Iterator[str]:
-    """The journal as JSON lines: the campaign first, then every event, oldest first; nothing is written."""
-    with _looking(folder) as opened:
-        yield canonical({"campaign": opened.name, **opened.identity.facts()})
-        for event in opened.events():
-            yield canonical(asdict(event))
+def attach(folder: Path, trial: int, path: Path, who: str, note: str) -> Attachment:
+    """Keeps a copy of a file, such as a video or a log, with a trial.
 
+    Args:
+        folder: of the campaign.
+        trial: its number.
+        path: of the file.
+        who: attaches it; recorded for good.
+        note: what it shows; recorded for good.
 
-@contextmanager
-def _open(folder: Path) -> Iterator[Journal]:
-    with closing(Journal(folder / journal.FILE, utc_now)) as opened:
-        yield opened
+    Returns:
+        The attachment.
 
-
-@contextmanager
-def _looking(folder: Path) -> Iterator[Journal]:
-    """The journal, also where nothing can be written: SQLite needs files beside it, even to read."""
-    if os.access(folder, os.W_OK) or not folder.is_dir():
-        with _open(folder) as opened:
-            yield opened
-        return
-    with tempfile.TemporaryDirectory(prefix="svaedc-") as name:
-        try:
-            for part in folder.glob(f"{journal.FILE}*"):
-                shutil.copyfile(part, Path(name) / part.name)
-        except OSError as error:
-            raise UserError(f"cannot read the journal in {folder}: {error.strerror}") from error
-        with _open(Path(name)) as opened:
-            opened.path = folder / journal.FILE
-            yield opened
+    Raises:
+        UsageError: nobody is named, or there is no such file.
+        JournalError: there is no such trial.
+        UserError: the file cannot be kept.
+    """
+    name = _require_name(who)
+    with opening.to_read(folder) as opened:
+        opened.trial(trial)
+    return attachments.attach(folder, trial, path, name, note.strip())
 
 
 def _gate(folder: Path, opened: Journal) -> Gate:

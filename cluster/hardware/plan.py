@@ -7,6 +7,8 @@ from cluster.errors import UsageError
 from cluster.hardware.events import canonical
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.proposals import fingerprint
+from cluster.hardware.record.first_trials import FirstTrial, digest
+from cluster.hardware.record.foresight import NO_FORESIGHT, Foresight
 from cluster.hardware.states import Approval
 from cluster.hardware.status import RANDOM_TRIALS
 from cluster.inputs import search_working_directory
@@ -30,6 +32,8 @@ class CampaignPlan:
         pace: least duration of a trial on a rehearsal robot, in s, at most a day.
         candidates: table of simulated ones, kept absolute; None where the campaign draws its own.
         home: of the robot, kept absolute; None for its usual one.
+        first: trials that it shares with another campaign; none where it has its own.
+        foresight: how what waits for a person is simulated for them.
     """
 
     identity: CampaignIdentity
@@ -38,6 +42,8 @@ class CampaignPlan:
     pace: float
     candidates: Path | None = None
     home: Path | None = None
+    first: tuple[FirstTrial, ...] = ()
+    foresight: Foresight = NO_FORESIGHT
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.pace <= LONGEST_PACE_SECONDS:
@@ -58,6 +64,8 @@ def identify(
     model: Path | None,
     approval: Approval,
     candidates: Path | None = None,
+    avoid: float = 0.0,
+    first: tuple[FirstTrial, ...] = (),
 ) -> CampaignIdentity:
     """Check the arguments of a campaign, and make its identity of them.
 
@@ -70,6 +78,9 @@ def identify(
         model: checkpoint; ignored by methods without a model.
         approval: who approves.
         candidates: table of simulated ones; None where the campaign draws its own.
+        avoid: root mean square difference of parameters, in [0, 1]; nothing nearer than this to a controller
+            that failed or was rejected is proposed.
+        first: trials that it shares with another campaign.
 
     Returns:
         The identity; its model is "" where the method needs none.
@@ -88,7 +99,7 @@ def identify(
             )
         if needs_model and model is None:
             raise UsageError(f"method {method!r} needs a trained model, got none; give one with --model")
-        digest = fingerprint(model) if needs_model and model else ""
+        checkpoint = fingerprint(model) if needs_model and model else ""
         if methods.needs_candidates(method) and candidates is None:
             raise UsageError(
                 f"method {method!r} needs candidates that were simulated, got none: make some with "
@@ -102,13 +113,15 @@ def identify(
             known.setup,
             method,
             seed,
-            digest,
+            checkpoint,
             pool,
             trials,
             approval,
             DRAWS,
             _codes(known.setup, method),
             sha256(candidates) if candidates is not None else "",
+            avoid,
+            digest(first),
         )
     except (LookupError, ValueError) as error:
         raise UsageError(str(error.args[0])) from error

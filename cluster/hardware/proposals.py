@@ -3,6 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from cluster.optimization.factory import Optimization
 from cluster.optimization.models import trained_model
 from svaedc.bo.features import Latents
 from svaedc.bo.history import History
-from svaedc.bo.strategies import Method
+from svaedc.bo.strategies import Avoidance
 from svaedc.model.svae_dc import SvaeDc
 from workers.setups import Setup
 
@@ -31,13 +32,14 @@ class Proposals:
 
     Attributes:
         optimization: decides them, together with what was measured.
-        method: suggests those after the first.
+        method: suggests those after the first, far from what failed or was rejected.
         latents: of the model; None for a method without one.
     """
 
     optimization: Optimization
-    method: Method
+    method: Avoidance
     latents: Latents | None
+    distance: float = 0.0
 
     @classmethod
     def of(
@@ -72,11 +74,22 @@ class Proposals:
         problem = optimization.problem()
         with usage_errors():
             method = methods.build(identity.method, problem)
-        return cls(optimization, method, problem.latents)
+        avoiding = Avoidance(method, problem.pool, identity.avoid)
+        return cls(optimization, avoiding, problem.latents)
 
-    def random(self, index: int) -> Float32[np.ndarray, " D"]:
-        """The random controller of one of the first trials, by its index."""
-        return self.optimization.initial(index)
+    def random(self, history: History, index: int) -> Float32[np.ndarray, " D"]:
+        """The random controller of one of the first trials.
+
+        Args:
+            history: what was tried.
+            index: of the trial.
+
+        Returns:
+            A point of the unit cube, [D]: the first from that index on that is neither tried already nor near
+            one that failed or was rejected.
+        """
+        with usage_errors():
+            return self.method.first(history, map(self.optimization.initial, count(index)))
 
     def suggest(self, history: History, index: int) -> Float32[np.ndarray, " D"]:
         """The next controller.
@@ -88,7 +101,8 @@ class Proposals:
         Returns:
             A point of the unit cube, [D].
         """
-        return self.method.suggest(history, self.optimization.rng(index))
+        with usage_errors():
+            return self.method.suggest(history, self.optimization.rng(index))
 
     def predict(self, x: Float[np.ndarray, " D"]) -> float | None:
         """Badness of x as the model expects it, in [0, 1]; None without a model."""

@@ -42,17 +42,23 @@ ACTIVE = frozenset({State.GRANTED, State.RUNNING, State.UNKNOWN})
 TERMINAL = frozenset({State.MEASURED, State.FAILED, State.ABORTED, State.REJECTED})
 
 
-def is_legal(old: State | None, new: State) -> bool:
-    """Whether a trial may go from one state to another.
+IMPORTED = "imported"
+"""The kind of a trial that another campaign measured."""
+
+
+def legal(old: State | None, kind: str) -> frozenset[State]:
+    """Where a trial may go.
 
     Args:
         old: state before; None where the trial does not exist yet.
-        new: state after.
+        kind: of the trial.
 
     Returns:
-        True where `LEGAL` has the transition.
+        What `LEGAL` has; an imported trial is measured as soon as it is proposed, and moves nothing.
     """
-    return new in LEGAL[old]
+    if kind == IMPORTED and old is State.PROPOSED:
+        return frozenset({State.MEASURED})
+    return LEGAL[old]
 
 
 class Approval(StrEnum):

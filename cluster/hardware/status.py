@@ -130,6 +130,7 @@ class Status:
             "planned": self.planned,
             "best": self.best,
             "advice": self.advice,
+            "motion": dict(self.motion),
             "trials": [
                 {
                     "number": trial.number,

@@ -64,7 +64,7 @@ class Optimization:
         """
         if self.candidates is not None:
             drawn = self.candidates.drawn
-            return drawn[generator(self.seed, Stream.INITIAL, 0).permutation(len(drawn))[index]]
+            return drawn[generator(self.seed, Stream.INITIAL, 0).permutation(len(drawn))[index % len(drawn)]]
         return self._uniform(generator(self.seed, Stream.INITIAL, index), (self.setup.dimensions,))
 
     def rng(self, index: int) -> np.random.Generator:

@@ -1,11 +1,13 @@
-"""Ways to choose the next controller: at random, or by Bayesian optimisation, in a trust region or not."""
+"""Ways to choose the next controller: at random, by Bayesian optimisation, and far from what failed."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from itertools import islice
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Bool, Float, Float32
 from torch import Tensor
 
 from svaedc.bo.acquisition import (
@@ -20,6 +22,11 @@ from svaedc.bo.gp import GaussianProcess, Posterior
 from svaedc.bo.history import History
 from svaedc.bo.surrogates import Surrogate
 from svaedc.bo.trust_region import TrustRegion
+
+ATTEMPTS: Final = 16
+"""A method that must avoid something is asked so often before a controller is drawn for it."""
+DRAWS: Final = 10_000
+"""Of so many controllers it is the first that is near nothing to avoid."""
 
 
 @runtime_checkable
@@ -162,6 +169,101 @@ class TrustRegionOptimization:
         center = torch.tensor(recent.x[recent.f.argmax()])
         box = self.surrogate.candidates.within(*region.box(center, _lengthscales(posterior)))
         return self.search.maximize(_value(posterior, self.acquisition, best), box, history, rng)
+
+
+@dataclass(frozen=True, eq=False)
+class Avoidance:
+    """A method that suggests nothing near a controller that failed.
+
+    Attributes:
+        method: Suggests.
+        pool: Controllers that it may choose from, [n, D]; those near a failed one count as failed too.
+        distance: Root mean square difference of two controllers' parameters, below which they are near.
+    """
+
+    method: Method
+    pool: Float[np.ndarray, "n D"]
+    distance: float
+
+    def suggest(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
+        """Choose the next controller; without a failed one, exactly as the method does.
+
+        Args:
+            history: Trials of the run so far.
+            rng: Generator of the trial.
+
+        Returns:
+            Controller, [D], in the unit cube.
+
+        Raises:
+            ValueError: All controllers are near one that failed.
+        """
+        if not len(history.failed):
+            return self.method.suggest(history, rng)
+        asked = self._with_neighbours(history)
+        for _ in range(ATTEMPTS):
+            x = self.method.suggest(asked, rng)
+            if not self.are_near(x[None], history.failed)[0]:
+                return x
+            asked = asked.append(x, np.nan)
+        return self._anywhere(history, rng)
+
+    def first(
+        self, history: History, controllers: Iterable[Float32[np.ndarray, " D"]]
+    ) -> Float32[np.ndarray, " D"]:
+        """Take the first of some controllers that may be tried.
+
+        Args:
+            history: Trials of the run so far.
+            controllers: In their order; there may be ever more.
+
+        Returns:
+            The first that was not tried and is near none that failed.
+
+        Raises:
+            ValueError: None of the first `DRAWS` may be.
+        """
+        tried = history.tried.astype(np.float32)
+        for x in islice(controllers, DRAWS):
+            if not (tried == x).all(axis=1).any() and not self.are_near(x[None], history.failed)[0]:
+                return x
+        raise self._nothing_left()
+
+    def are_near(
+        self, x: Float[np.ndarray, "n D"], failed: Float[np.ndarray, "m D"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Tell which controllers are near one that failed.
+
+        Args:
+            x: Controllers, [n, D].
+            failed: Those that failed, [m, D].
+
+        Returns:
+            Whether each is, [n].
+        """
+        near = np.zeros(len(x), dtype=bool)
+        for each in failed:
+            near |= np.sqrt(np.mean((x - each) ** 2, axis=1)) < self.distance
+        return near
+
+    def _with_neighbours(self, history: History) -> History:
+        """The history in which candidates near a failed one failed as well."""
+        near = self.pool[self.are_near(self.pool, history.failed)]
+        return History(history.x, history.f, np.concatenate([history.failed, near]))
+
+    def _anywhere(self, history: History, rng: np.random.Generator) -> Float32[np.ndarray, " D"]:
+        """A controller drawn uniformly from those that are near none."""
+        drawn = rng.random((DRAWS, history.x.shape[1]), dtype=np.float32)
+        far = drawn[~self.are_near(drawn, history.failed)]
+        if not len(far):
+            raise self._nothing_left()
+        return far[0].copy()
+
+    def _nothing_left(self) -> ValueError:
+        return ValueError(
+            f"each of {DRAWS} controllers was tried, or lies within {self.distance:g} of one that failed or "
+            "was rejected: ask for a smaller distance"
+        )
 
 
 def _value(posterior: Posterior, acquisition: Acquisition, best: float) -> Value:

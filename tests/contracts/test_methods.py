@@ -6,12 +6,14 @@ import torch
 
 from svaedc.bo import methods
 from svaedc.bo.history import History
+from svaedc.bo.strategies import Avoidance
 from tests.svaedc.bo.fake_latents import problem, quadratic
 
 DIMENSIONS, CANDIDATES = 4, 60
 OFF_POOL = {"random", "botorch", "saasbo", "turbo", "se-acqf", "matern-acqf"}
 ON_POOL = [name for name in methods.names() if name not in OFF_POOL]
 OTHER_SEARCH = ["svae-acqf", "screened-svae-acqf", "lkl-acqf", "botorch-pool", "turbo-pool"]
+DISTANCE = 0.1
 OTHER_ACQUISITION = ["se-ei", "svae-dc-acqf-ei", "bbk-kl-ei", "botorch-ucb", "turbo-pool-ucb"]
 
 
@@ -20,6 +22,11 @@ def history(count):
     for x in np.random.default_rng(5).random((count, DIMENSIONS), dtype=np.float32):
         grown = grown.append(x, quadratic(x))
     return grown
+
+
+def distance(one, other):
+    """The root mean square difference of two controllers' parameters."""
+    return float(np.sqrt(np.mean((one - other) ** 2)))
 
 
 def built(name):
@@ -108,3 +115,13 @@ def test_repeated_controllers_with_different_outcomes_are_no_obstacle(name):
         grown = grown.append(np.full(DIMENSIONS, 0.5, dtype=np.float32), f)
     x = built(name).suggest(grown, np.random.default_rng(0))
     assert ((x >= 0) & (x <= 1)).all()
+
+
+@every_method
+def test_nothing_near_a_controller_that_failed_is_suggested_by_any_method(name):
+    past, pool = history(4), problem(DIMENSIONS, CANDIDATES, seed=3).pool
+    avoiding = Avoidance(built(name), pool, DISTANCE)
+    for index in range(4):
+        x = avoiding.suggest(past, np.random.default_rng(index))
+        assert all(distance(x, failed) >= DISTANCE for failed in past.failed)
+        past = past.append(x, np.nan)

@@ -14,6 +14,7 @@ from workers.environments.environment import Channel
 from workers.hardware.robots import GAP
 from workers.host.limits import HostChannel
 from workers.host.machine import Fault, Plan, Rest, RobotMachine
+from workers.host.recording import write_table
 from workers.randomness import Stream, generator
 from workers.rollout import Steps
 from workers.user_code import describe
@@ -88,6 +89,10 @@ class RehearsalMachine(RobotMachine):
             episode = self._current().episode()
         if not np.isfinite(episode.f):
             raise Fault("the simulation exploded")
+        if self.folder is not None:
+            # As text, from which the same numbers are read: the host's own files have this form too.
+            names = [channel.name for channel in self._setup.observation]
+            write_table(self.folder / "trajectory.csv", names, episode.xi.T.tolist())
         return {
             "f": float(episode.f),
             "y": float(episode.y),

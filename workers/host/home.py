@@ -68,6 +68,11 @@ class RobotHome:
         return self.path / "host.log"
 
     @property
+    def trials(self) -> Path:
+        """Where what was recorded of trials lies, in a folder of each, until their campaign has taken it."""
+        return self.path / "trials"
+
+    @property
     def socket(self) -> Path:
         """Where the process at the robot listens for a stop; elsewhere if the home's own path is too long."""
         own = self.path / "stop.socket"

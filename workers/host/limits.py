@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -98,6 +98,23 @@ class RobotLimits:
         """
         table = self.tables.get(kind, {})
         return table.get(name, table.get(ALL))
+
+    def margin(self, channel: HostChannel, low: float, high: float) -> "float | None":
+        """How far values stay inside a channel's own limit.
+
+        Args:
+            channel: whose values.
+            low: the lowest.
+            high: the highest.
+
+        Returns:
+            The least distance to the limit; None where there is none.
+        """
+        limit = self.of(channel.kind, channel.name)
+        if limit is None:
+            return None
+        lowest, highest = limit if channel.kind in _RANGES else (-limit, limit)
+        return float(min(low - lowest, highest - high))
 
     def wait_seconds(self, starts: Iterable[float], now: float) -> float:
         """How long the robot must rest before its next trial.
@@ -200,26 +217,6 @@ def first_objection(watch: LimitWatch, rows: Iterable[Sequence[Any]]) -> str:
         if found:
             return f"step {number}: {found}"
     return ""
-
-
-def extremes(channels: Sequence[HostChannel], rows: Sequence[Sequence[float]]) -> Iterator[dict[str, Any]]:
-    """What a plan asks of each channel, for people.
-
-    Args:
-        channels: of every row, in order.
-        rows: of the plan, at least one.
-
-    Yields:
-        Name, kind, unit, lowest and highest value.
-    """
-    for channel, values in zip(channels, zip(*rows)):  # noqa: B905 - rows were checked
-        yield {
-            "name": channel.name,
-            "kind": channel.kind,
-            "unit": channel.unit,
-            "low": min(values),
-            "high": max(values),
-        }
 
 
 def _table(value: Any, kind: str, source: str) -> dict[str, Any]:

@@ -1,11 +1,12 @@
 """What the host asks of a robot: the class that whoever connects one writes."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
-from workers.host.limits import HostChannel
+from workers.host.limits import HostChannel, RobotLimits
 
 RESTS = ("hold", "sag", "drop", "go on")
 """What motors do: hold their place, sag slowly, drop at once, or go on to where they were sent last."""
@@ -60,6 +61,27 @@ class Plan:
     rows: Sequence[Sequence[float]]
     seconds: float
 
+    def extremes(self, limits: RobotLimits) -> Iterator[dict[str, Any]]:
+        """What each channel is asked for, for people; no row must be beyond the limits.
+
+        Args:
+            limits: of the robot.
+
+        Yields:
+            Name, kind, unit, lowest and highest value; `fastest`, the greatest change per second; `margin`,
+            how far the values stay inside the channel's own limit, or None where it has none.
+        """
+        for channel, values in zip(self.channels, zip(*self.rows)):  # noqa: B905 - rows were checked
+            low, high = min(values), max(values)
+            changes = [abs(new - old) for old, new in zip(values, values[1:])]  # noqa: B905, RUF007
+            yield {
+                **asdict(channel),
+                "low": low,
+                "high": high,
+                "fastest": max(changes, default=0.0) / self.period,
+                "margin": limits.margin(channel, low, high),
+            }
+
 
 class Fault(RuntimeError):  # noqa: N818 - a fault is what roboticists call it
     """The robot broke off, stands still, and has no valid objective to report."""
@@ -72,11 +94,14 @@ class RobotMachine(ABC):
         rest: what its motors do without commands.
         period: s between two commands.
         channels: of a command, in order.
+        folder: of the trial under way: every file that the driver leaves there (what was seen, a video, a
+            log) becomes part of the campaign's record.
     """
 
     rest: ClassVar[Rest]
     period: float
     channels: tuple[HostChannel, ...]
+    folder: "Path | None" = None
 
     @abstractmethod
     def plan(self, x: Sequence[float]) -> Plan:

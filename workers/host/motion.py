@@ -31,6 +31,7 @@ class Pulse:
         late: how many of them came more than a period after their time.
         over: whether the motion under way has ended, however it did.
         at_rest: whether the robot stands still; not where its driver failed to stop it.
+        sent: every command of this motion, behind the time at which it was sent, in s of `now`.
     """
 
     moving: bool = False
@@ -39,6 +40,7 @@ class Pulse:
     late: int = 0
     over: threading.Event = field(default_factory=threading.Event)
     at_rest: bool = True
+    sent: list[tuple[float, ...]] = field(default_factory=list)
 
 
 def run(
@@ -65,6 +67,7 @@ def run(
     machine.begin(x)
     guard.beat = now()  # getting ready may take any time, and moves nothing
     pulse.commands = pulse.late = 0
+    pulse.sent = []
     pulse.over = threading.Event()
     pulse.moving, pulse.at_rest = True, False
     try:
@@ -100,6 +103,7 @@ def _stream(machine: RobotMachine, watch: LimitWatch, guard: Guard, pulse: Pulse
             raise Stopped(found)
         machine.send(command)
         pulse.last_command = now()
+        pulse.sent.append((pulse.last_command, *command))
         pulse.commands, step = pulse.commands + 1, step + 1
         pulse.late += period > 0 and time.monotonic() > due + 2 * period
         due = max(due + period, time.monotonic() - period)

@@ -11,15 +11,17 @@ import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from workers.host import motion, protocol, stop
 from workers.host.guard import SILENCE_SECONDS, Guard, now
 from workers.host.home import RobotHome
 from workers.host.ledger import LedgerDamaged
-from workers.host.limits import LimitWatch, RobotLimits, extremes, first_objection
+from workers.host.limits import LimitWatch, RobotLimits, first_objection
 from workers.host.machine import Fault, RobotMachine
 from workers.host.motion import Pulse, Stopped
+from workers.host.recording import COMMANDS, make_folder, travel, write_table
 
 STARTED, ENDED, BROKEN = "started", "ended", "broken"
 """Events of the ledger: a trial is about to move the robot; it came to its end; it did not."""
@@ -106,7 +108,7 @@ class Host:
         return {
             "seconds": plan.seconds,
             "steps": len(plan.rows),
-            "channels": [] if found else list(extremes(plan.channels, plan.rows)),
+            "channels": [] if found else list(plan.extremes(self.limits)),
             "objection": found,
         }
 
@@ -115,6 +117,7 @@ class Host:
         found = self._plan_of(x)["objection"] or self._not_yet(trial)
         if found:
             return {"say": "refused", "trial": trial, "reason": found}
+        self.machine.folder = folder = make_folder(self.home.trials, trial)
         ledger = self.home.ledger
         self.guard.deadline = now() + min(seconds, self.limits.duration)
         self.guard.beat = now()
@@ -128,7 +131,17 @@ class Host:
         except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
             what, reason = self._note_break(trial, *_meaning_of(error))
             return {"say": what, "trial": trial, "reason": reason}
+        finally:
+            self._record_commands(folder)
         return {"say": "ended", "trial": trial, "measurement": measured, **self._commands()}
+
+    def _record_commands(self, folder: Path) -> None:
+        """Keep what was sent; a full disk must not change what became of the trial."""
+        header = ["seconds", *(channel.name.replace(",", " ") for channel in self.machine.channels)]
+        began = self.pulse.sent[0][0] if self.pulse.sent else 0.0
+        with suppress(OSError):
+            rows = ((at - began, *command) for at, *command in self.pulse.sent)
+            write_table(folder / COMMANDS, header, rows)
 
     def _note_break(self, trial: str, what: str, reason: str) -> "tuple[str, str]":
         """Tell the ledger how a motion ended; where it takes no more, nobody knows what the robot did."""
@@ -155,7 +168,13 @@ class Host:
 
     def _commands(self) -> "dict[str, Any]":
         pulse = self.pulse
-        return {"commands": pulse.commands, "late": pulse.late, "last_command": pulse.last_command}
+        return {
+            "commands": pulse.commands,
+            "late": pulse.late,
+            "last_command": pulse.last_command,
+            "seconds": pulse.sent[-1][0] - pulse.sent[0][0] if pulse.sent else 0.0,
+            "travel": travel(self.machine.channels, self.machine.period, pulse.sent),
+        }
 
     def _give_up(self, found: str) -> None:
         """The driver hangs: leave, which the ledger and whoever drives this will notice."""

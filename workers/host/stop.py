@@ -99,6 +99,7 @@ def listen(
     server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     server.bind(os.fspath(path))
     server.listen(16)
+    answering = threading.Lock()
 
     def serve() -> None:
         while True:
@@ -106,7 +107,7 @@ def listen(
                 connection, _ = server.accept()
             except OSError:
                 return
-            with connection, suppress(OSError, ValueError, TypeError, KeyError):
+            with answering, connection, suppress(OSError, ValueError, TypeError, KeyError):
                 _answer(connection, guard, pulse, facts)
 
     threading.Thread(target=serve, name="stop", daemon=True).start()
@@ -114,6 +115,9 @@ def listen(
     def close() -> None:
         server.close()
         path.unlink(missing_ok=True)
+        # Whoever asked for a stop gets the answer before the process ends.
+        if answering.acquire(timeout=PATIENCE_SECONDS):
+            answering.release()
 
     return close
 

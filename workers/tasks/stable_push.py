@@ -90,6 +90,19 @@ class StablePush(Task):
         """
         return self.objective_limits[0]
 
+    def clearance(self, observed: Observed) -> float:
+        """Measure how near the hand came to the border of its workspace.
+
+        Args:
+            observed: all steps of the episode.
+
+        Returns:
+            The least distance inside that border along x and y, in m; negative outside it.
+        """
+        x, y, *_ = observed.signals["hand_position"]
+        sides = [x - self.table_x[0], self.table_x[1] - x, y - self.table_y[0], self.table_y[1] - y]
+        return float(np.min(sides) + self.margin)
+
     def _object(self, observed: Observed, number: int) -> Float32[np.ndarray, "9 time"]:
         begin = self.channel + 9 * number
         return observed.xi[begin : begin + 9]

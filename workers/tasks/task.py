@@ -49,6 +49,17 @@ class Task(ABC):
             The number that Bayesian optimisation maximises.
         """
 
+    def clearance(self, observed: Observed) -> float:  # noqa: ARG002
+        """Measure how near the robot came to what it must keep away from.
+
+        Args:
+            observed: all steps of the episode.
+
+        Returns:
+            The least distance, in m, negative where it went too far; NaN where a task does not tell.
+        """
+        return math.nan
+
     def stopped_objective(self, observed: Observed, bad: Bad) -> float:
         """Value an episode that a stop rule ended.
 

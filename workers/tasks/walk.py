@@ -54,6 +54,19 @@ class Walk(Task):
             ]
         )
 
+    def clearance(self, observed: Observed) -> float:
+        """Measure how near the body came to the borders of the walkway, and to its lowest and highest.
+
+        Args:
+            observed: all steps of the episode.
+
+        Returns:
+            The least distance inside all of them, in m; negative outside.
+        """
+        x, _, z = observed.xi[self.channel : self.channel + 3]
+        low, high = self.height
+        return float(np.min([self.corridor - np.abs(x), z - low, high - z]))
+
     def objective(self, observed: Observed, bad: Bad) -> float:
         """Value a walk towards +y.
 

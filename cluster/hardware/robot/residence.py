@@ -4,7 +4,7 @@ import json
 import os
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -13,12 +13,15 @@ from cluster.files import write_json
 from cluster.home import robot_folder
 from workers.hardware.driver import RobotFault
 from workers.hardware.gate import GateShut
+from workers.host import durable
 from workers.host.home import RobotHeld, RobotHome
 from workers.host.ledger import LedgerDamaged
 from workers.host.limits import RobotLimits
 
 FILE: Final = "robot.json"
 """A campaign's folder says in it which home its robot has."""
+ELSEWHERE: Final = "elsewhere.txt"
+"""The usual home of a robot names in it the other homes that campaigns were begun with."""
 
 
 @contextmanager
@@ -80,6 +83,7 @@ def enter(folder: Path, robot: str, home: Path | None) -> RobotHome:
     found = home_of_campaign(folder, robot, home)
     with robot_errors():
         found.make()
+        _note_elsewhere(found)
         write_json(folder / FILE, {"robot": robot, "home": os.fspath(found.path)})
     return found
 
@@ -126,6 +130,41 @@ def limits_of(home: RobotHome, simulated: bool) -> RobotLimits:  # noqa: FBT001 
         ) from None
     except (ValueError, OSError) as error:
         raise UserError(f"cannot use the limits of {home.robot}: {error}") from error
+
+
+def homes_of(robot: str, home: Path | None) -> tuple[RobotHome, ...]:
+    """Every home that a robot has on this machine, as far as this user's campaigns know.
+
+    Args:
+        robot: its name.
+        home: folder that a person named; None for the usual one and all that campaigns were begun with.
+
+    Returns:
+        Those whose folder exists.
+
+    Raises:
+        UsageError: nobody knows where the user's home is.
+    """
+    first = home_of(robot, home)
+    others = [RobotHome(path, robot) for path in _elsewhere(first)] if home is None else []
+    return tuple(each for each in (first, *others) if each.path.is_dir())
+
+
+def _note_elsewhere(found: RobotHome) -> None:
+    """Let a stop that names the robot alone find a home that a person chose."""
+    with suppress(UserError, OSError):  # nobody's home is known, or it cannot be written: --home finds it
+        usual = home_of(found.robot, None)
+        if found.path not in (usual.path, *_elsewhere(usual)):
+            usual.make()
+            durable.append(usual.path / ELSEWHERE, os.fsencode(found.path) + b"\n")
+
+
+def _elsewhere(usual: RobotHome) -> list[Path]:
+    try:
+        lines = (usual.path / ELSEWHERE).read_bytes().splitlines()
+    except OSError:
+        return []
+    return [Path(os.fsdecode(line)) for line in lines if line]
 
 
 def _remembered_home(folder: Path) -> Path | None:

@@ -2,11 +2,12 @@
 
 import os
 import signal
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cluster.errors import UsageError, UserError
-from cluster.hardware.robot.residence import home_of, robot_errors
+from cluster.hardware.robot.residence import home_of, homes_of, robot_errors
 from workers.hardware.gate import CLEARED
 from workers.hardware.host_process import HARMLESS_TO_KILL
 from workers.host import stop as way
@@ -27,11 +28,13 @@ class Stopping:
         answer: of the host.
         killed: whether a host that did not answer was killed.
         advice: for the person in charge.
+        is_held: whether a process has the robot.
     """
 
     answer: Answer
     killed: bool
     advice: str
+    is_held: bool
 
 
 def stop(robot: str, home: Path | None, who: str, reason: str) -> Stopping:
@@ -39,7 +42,7 @@ def stop(robot: str, home: Path | None, who: str, reason: str) -> Stopping:
 
     Args:
         robot: its name.
-        home: folder that a person named; None for the usual one.
+        home: folder that a person named; None for every home that it has here.
         who: stops it.
         reason: in words.
 
@@ -49,12 +52,12 @@ def stop(robot: str, home: Path | None, who: str, reason: str) -> Stopping:
     Raises:
         UserError: the robot has no home here, or neither latch nor host could be reached.
     """
-    found = _existing(robot, home)
-    with robot_errors():
-        answer = way.request(found, Stop(who, reason))
-        killed = not answer.reached and _kill(found)
-        _note(found, STOPPED, {"who": who, "reason": reason})
-    return Stopping(answer, killed, _advice(found, answer, killed))
+    homes = _existing(robot, home)
+    with robot_errors(), ThreadPoolExecutor(len(homes)) as at_once:  # one that hangs must not delay another
+        stops = list(at_once.map(lambda each: _stop_at(each, Stop(who, reason)), homes))
+    first = max(stops, key=lambda each: (each.answer.reached, each.killed, each.is_held))
+    others = [each for each in stops if each is not first and each.is_held]
+    return replace(first, advice="\n".join(each.advice for each in (first, *others)))
 
 
 def clear(robot: str, home: Path | None, who: str, note: str) -> str:
@@ -62,7 +65,7 @@ def clear(robot: str, home: Path | None, who: str, note: str) -> str:
 
     Args:
         robot: its name.
-        home: folder that a person named; None for the usual one.
+        home: folder that a person named; None for every home that it has here.
         who: has looked at the robot.
         note: what they saw.
 
@@ -75,22 +78,28 @@ def clear(robot: str, home: Path | None, who: str, note: str) -> str:
     """
     if not who.strip() or not note.strip():
         raise UsageError("a stop is cleared by a person who has seen the robot: give --who NAME --note TEXT")
-    found = _existing(robot, home)
     with robot_errors():
-        why = found.latch.read()
-        if why is None:
-            return ""
-        found.ledger.append(CLEARED, {"who": who.strip(), "note": note.strip(), "stop": str(why)})
-        found.latch.clear()
-    return str(why)
+        stopped = [each for each in _existing(robot, home) if each.latch.is_set]
+        reasons = [str(each.latch.read()) for each in stopped]
+        for each, why in zip(stopped, reasons, strict=True):
+            each.ledger.append(CLEARED, {"who": who.strip(), "note": note.strip(), "stop": why})
+            each.latch.clear()
+    return reasons[0] if reasons else ""
 
 
-def _existing(robot: str, home: Path | None) -> RobotHome:
-    found = home_of(robot, home)
-    if not found.path.is_dir():
+def _stop_at(home: RobotHome, asked: Stop) -> Stopping:
+    answer = way.request(home, asked)
+    killed = not answer.reached and _kill(home)
+    _note(home, STOPPED, {"who": asked.who, "reason": asked.reason})
+    return Stopping(answer, killed, _advice(home, answer, killed), bool(home.holder()))
+
+
+def _existing(robot: str, home: Path | None) -> tuple[RobotHome, ...]:
+    found = homes_of(robot, home)
+    if not found:
         raise UserError(
-            f"{found.path} is no robot's home: no campaign of {robot} was ever begun with it here; name the "
-            "robot as `svaedc robots` does, or its home with --home"
+            f"{home_of(robot, home).path} is no robot's home: no campaign of {robot} was ever begun with it "
+            "here; name the robot as `svaedc robots` does, or its home with --home"
         )
     return found
 

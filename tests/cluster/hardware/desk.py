@@ -114,7 +114,7 @@ class DeskProposals:
     method: Callable[..., np.ndarray] = climb
     seed: int = IDENTITY.seed
 
-    def random(self, index):
+    def random(self, _, index):
         return generator(self.seed, Stream.INITIAL, index).random(DIMENSIONS)
 
     def suggest(self, history, index):

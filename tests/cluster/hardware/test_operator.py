@@ -13,6 +13,7 @@ from cluster.errors import UsageError, UserError
 from cluster.hardware import campaign, journal, operator
 from cluster.hardware.journal import IllegalTransition
 from cluster.hardware.lock import FolderLock, FolderTaken
+from cluster.hardware.record import export
 from cluster.hardware.states import Approval, State
 from cluster.hardware.status import Phase
 from tests.cluster.hardware.desk import IDENTITY, DeskRobot, Fuse, campaign_on, carry_out, opened, starts
@@ -84,7 +85,7 @@ def test_an_amendment_replaces_the_measurement_and_keeps_the_old(tmp_path):
         -0.5,
         0.0,
     )
-    assert len([line for line in operator.export(tmp_path) if '"new":"measured"' in line]) == 5
+    assert len([line for line in export.lines(tmp_path) if '"new":"measured"' in line]) == 5
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_a_failed_trial_is_told_with_its_reason_after_another_was_amended(tmp_pa
 
 def test_the_export_is_the_campaign_and_every_event(tmp_path):
     carry_out(tmp_path)
-    first, *events = [json.loads(line) for line in operator.export(tmp_path)]
+    first, *events = [json.loads(line) for line in export.lines(tmp_path)]
     assert first == {"campaign": "desk-1", **IDENTITY.facts()}
     with closing(opened(tmp_path)) as book:
         assert events == [asdict(event) for event in book.events()]
@@ -222,7 +223,7 @@ def test_who_only_looks_writes_nothing(tmp_path, monkeypatch):
     carry_out(tmp_path)
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere but on read-only media
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    seen, exported = operator.status(tmp_path), list(operator.export(tmp_path))
+    seen, exported = operator.status(tmp_path), list(export.lines(tmp_path))
     assert (seen.phase, seen.folder, len(exported)) == (Phase.COMPLETE, tmp_path, 1 + 4 * 6)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     with pytest.raises(UserError, match=f"no campaign in {tmp_path / 'none'}"):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cluster.errors import UsageError, UserError
-from cluster.hardware import operator
 from cluster.hardware.executor import Executor
 from cluster.hardware.plan import identify
 from cluster.hardware.proposals import Proposals, fingerprint, library_versions
+from cluster.hardware.record import export
 from cluster.hardware.states import Approval
 from cluster.optimization.candidates import TABLE, write
 from svaedc.bo.history import History
@@ -21,14 +21,14 @@ from workers import setups
 
 def test_the_check_records_the_badness_that_the_model_expects(tmp_path, model):
     carried_out(plan_in(tmp_path, "svae-dc", 0, model))
-    events = [json.loads(line) for line in operator.export(tmp_path)][1:]
+    events = [json.loads(line) for line in export.lines(tmp_path)][1:]
     checks = [json.loads(event["body"]) for event in events if event["new"] == "checked"]
     assert [0.0 <= check["predicted_y"] <= 1.0 for check in checks] == [True, True]
 
 
 def test_proposals_keep_the_versions_they_were_computed_with(tmp_path):
     carried_out(plan_in(tmp_path, trials=0))
-    bodies = [json.loads(json.loads(line).get("body", "{}")) for line in operator.export(tmp_path)]
+    bodies = [json.loads(json.loads(line).get("body", "{}")) for line in export.lines(tmp_path)]
     assert [body["versions"] for body in bodies if "versions" in body] == 2 * [library_versions()]
     assert library_versions()["numpy"] == np.__version__
 
@@ -66,7 +66,9 @@ def test_a_campaign_chooses_among_the_candidates_it_was_planned_with_and_no_othe
     identity = identify(ROBOT, "simulated-best", 1, 0, 100, None, Approval.POLICY, path)
     setup = setups.load(identity.setup)
     proposals = Proposals.of(identity, setup, None, path)
-    assert proposals.random(0).tobytes() in {row.tobytes() for row in candidates.drawn}
+    assert proposals.random(History.empty(setup.dimensions), 0).tobytes() in {
+        row.tobytes() for row in candidates.drawn
+    }
     best = candidates.x[candidates.f.mean(axis=1).argmax()]
     assert np.array_equal(proposals.suggest(History.empty(setup.dimensions), 2), best)
     with pytest.raises(UserError, match=r"candidates \(none\) are not those"):

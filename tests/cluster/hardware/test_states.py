@@ -2,7 +2,7 @@
 
 import pytest
 
-from cluster.hardware.states import ACTIVE, LEGAL, TERMINAL, State, is_legal
+from cluster.hardware.states import ACTIVE, IMPORTED, LEGAL, TERMINAL, State, legal
 
 DESIGN = {
     (None, "proposed"),
@@ -52,4 +52,10 @@ def test_what_may_have_moved_the_robot_never_runs_again(state):
 
 def test_only_states_in_which_the_robot_may_move_are_active():
     assert {State.GRANTED, State.RUNNING, State.UNKNOWN} == ACTIVE
-    assert not is_legal(State.PROPOSED, State.RUNNING)
+    assert State.RUNNING not in LEGAL[State.PROPOSED]
+
+
+def test_what_was_imported_is_measured_at_once_and_can_only_be_amended():
+    assert legal(State.PROPOSED, IMPORTED) == {State.MEASURED}
+    assert legal(State.MEASURED, IMPORTED) == {State.MEASURED}
+    assert legal(State.PROPOSED, "random") == LEGAL[State.PROPOSED]

@@ -66,6 +66,7 @@ def test_the_served_page_lists_the_run_and_an_interrupt_ends_the_server(served, 
     assert not answers(free_port)
 
 
+@pytest.mark.slow
 def test_the_server_ends_when_its_command_is_killed_outright(served, free_port):
     process, _ = served
     assert answers(free_port)

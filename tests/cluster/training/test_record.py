@@ -34,6 +34,7 @@ def test_a_full_disk_while_recording_is_named_and_loses_nothing(run_train, finis
     assert run_train().with_name("metrics.json").exists()
 
 
+@pytest.mark.slow
 def test_a_collapsed_model_of_a_full_size_dataset_is_refused_every_time(run_train, finished):
     measures = finished.with_name("metrics.json")
     summary = json.loads(measures.read_text())

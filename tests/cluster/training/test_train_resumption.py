@@ -10,8 +10,9 @@ from cluster.training.train import working_in
 from svaedc.model import checkpoint
 from tests.cluster.training.small import same, weights
 
+pytestmark = pytest.mark.slow  # they need trainings that ended in several ways
 
-@pytest.mark.slow
+
 def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half_way, ends):
     assert checkpoint.load(half_way)[1]["update"] == 20
     path = run_train()
@@ -20,7 +21,6 @@ def test_training_stops_at_its_time_limit_and_goes_on_from_there(run_train, half
     assert same(weights(path), weights(ends["finished"] / "model.pt"))
 
 
-@pytest.mark.slow
 def test_a_training_that_has_no_room_to_go_on_is_tracked_by_no_new_run(
     run_train, half_way, tracking_settings
 ):
@@ -39,7 +39,6 @@ def test_two_trainings_at_once_in_one_folder_are_refused(run_train, finished):
     assert run_train() == finished
 
 
-@pytest.mark.slow
 def test_a_training_that_died_before_its_last_file_still_leaves_a_model(run_train, finished):
     before = weights(finished)
     finished.unlink()
@@ -59,7 +58,6 @@ def test_a_finished_model_is_not_trained_over(run_train, finished):
         run_train(updates=50)
 
 
-@pytest.mark.slow
 def test_training_goes_on_in_another_tracking_store_as_a_new_run(run_train, half_way, tracking_settings):
     before = json.loads(half_way.with_name("run.json").read_text())["run"]
     path = run_train()

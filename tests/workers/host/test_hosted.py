@@ -312,6 +312,7 @@ def test_what_is_no_measurement_is_never_in_the_ledger_as_one(arm, home, trouble
     assert robot.motion("desk-0").measurement is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kill", "survives"), [("sag", False), ("drop", True)])
 def test_a_host_that_does_not_answer_is_not_waited_for_for_ever(arm, home, log, monkeypatch, kill, survives):
     robot = arm(period=0.05, kill=kill)

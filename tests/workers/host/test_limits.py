@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from workers.host.limits import HostChannel, LimitWatch, RobotLimits, extremes, first_objection
+from workers.host.limits import HostChannel, LimitWatch, RobotLimits, first_objection
+from workers.host.machine import Plan
 
 JOINTS = (HostChannel("hip", "position", "rad"), HostChannel("knee", "position", "rad"))
 LIMITS = RobotLimits.read(
@@ -117,7 +118,10 @@ def test_rest_and_trials_of_an_hour_and_a_day_are_waited_for():
     assert RobotLimits().wait_seconds([999.9], 1000.0) == 0
 
 
-def test_extremes_are_told_by_channel():
-    [hip, knee] = extremes(JOINTS, [[0.0, 0.2], [-0.5, 0.4]])
+def test_extremes_are_told_by_channel_with_speeds_and_margins():
+    plan = Plan(JOINTS, 0.1, [[0.0, 0.2], [-0.5, 0.4], [-0.4, 0.4]], 0.3)
+    hip, knee = plan.extremes(RobotLimits.read({"position": {"knee": [0.0, 1.0]}}, "test"))
     assert (hip["name"], hip["unit"], hip["low"], hip["high"]) == ("hip", "rad", -0.5, 0.0)
     assert (knee["low"], knee["high"]) == (0.2, 0.4)
+    assert (hip["fastest"], knee["fastest"]) == pytest.approx((5.0, 2.0))
+    assert (hip["margin"], knee["margin"]) == (None, pytest.approx(0.2))
