@@ -21,6 +21,7 @@ _TOLD = (
     "f", "y", "predicted_y", "reason", "note", "fault", "cause", "until", "limits", "campaign", "seconds",
     "stop",
 )  # fmt: skip
+_ABOVE: dict[str, Any] = {"frameon": False, "ncols": 3, "loc": "lower left", "bbox_to_anchor": (0, 1)}
 _MEASURED, _BEST = "#0072b2", "#d55e00"
 
 
@@ -102,7 +103,7 @@ def _draw_objectives(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
         axes.plot(*zip(*simulated, strict=True), "x", color="#666", label="mean of simulations")
     axes.set(xlabel="trial", ylabel="objective f")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(frameon=False)
+    axes.legend(**_ABOVE)
 
 
 def _draw_badness(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
@@ -113,7 +114,7 @@ def _draw_badness(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
             axes.plot(*zip(*known, strict=True), marker, color=_MEASURED, label=label)
     axes.set(xlabel="badness y, predicted", ylabel="measured", xlim=(-0.03, 1.03), ylim=(-0.03, 1.03))
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(frameon=False)
+        axes.legend(**_ABOVE)
     else:
         axes.text(0.5, 0.5, "nothing was predicted", ha="center", color="#666")
 
