@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -73,7 +73,7 @@ class Ledger:
             OSError: the file cannot be read.
         """
         whole, _ = self._content()
-        return list(self._verified_entries(whole))
+        return self._verified_entries(whole)
 
     @property
     def is_cut(self) -> bool:
@@ -100,7 +100,7 @@ class Ledger:
         """
         with durable.exclusively(self.path.with_suffix(".lock")):
             whole, rest = self._content()
-            known = list(self._verified_entries(whole))
+            known = self._verified_entries(whole)
             if rest:
                 known.append(self._close_cut(known, whole, rest))
             return self._write(known, event, facts)
@@ -114,16 +114,22 @@ class Ledger:
         end = content.rfind(b"\n") + 1
         return content[:end], content[end:]
 
-    def _verified_entries(self, whole: bytes) -> Iterator[LedgerEntry]:
-        prev = FIRST
-        for number, line in enumerate(whole.split(b"\n")[:-1], start=1):
+    def _verified_entries(self, whole: bytes) -> list[LedgerEntry]:
+        """All lines; those that were verified before, and whose bytes are the same, are not parsed again."""
+        seen = _SEEN.get(self.path, _Seen())
+        if hashlib.sha256(whole[: seen.length]).digest() != seen.digest:
+            seen = _Seen()
+        found = list(seen.entries)
+        for line in whole[seen.length :].split(b"\n")[:-1]:
+            number, prev = len(found) + 1, found[-1].hash if found else FIRST
             entry = _parsed_entry(line)
             if entry is None or entry.hash != entry.expected_hash():
                 raise self._damage(f"line {number} was altered")
             if (entry.seq, entry.prev) != (number, prev):
                 raise self._damage(f"line {number} does not follow the one before it")
-            prev = entry.hash
-            yield entry
+            found.append(entry)
+        _SEEN[self.path] = _Seen(len(whole), hashlib.sha256(whole).digest(), tuple(found))
+        return found
 
     def _close_cut(self, known: list[LedgerEntry], whole: bytes, rest: bytes) -> LedgerEntry:
         """Put a line in the place of one that was cut off, with what is left of that as evidence."""
@@ -143,6 +149,18 @@ class Ledger:
             "which trials moved the robot, and restore a copy of it, or rename it: then every campaign asks "
             "for a person"
         )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The beginning of a file that was verified in this process: a robot's ledger grows for years."""
+
+    length: int = 0
+    digest: bytes = hashlib.sha256(b"").digest()
+    entries: "tuple[LedgerEntry, ...]" = ()
+
+
+_SEEN: "dict[Path, _Seen]" = {}
 
 
 def _parsed_entry(line: bytes) -> "LedgerEntry | None":

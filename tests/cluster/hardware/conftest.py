@@ -9,7 +9,7 @@ import pytest
 def processes():
     """Real processes that start in milliseconds: forked from a server that has imported everything."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.cluster.hardware.desk"])
+    context.set_forkserver_preload(["tests.cluster.hardware.desk", "cluster.hardware.executor"])
     return context
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 
 from workers.host.ledger import CUT, Ledger, LedgerDamaged
+from workers.host.ledger import _parsed_entry as parse
 
 
 @pytest.fixture
@@ -73,3 +74,27 @@ def test_what_cannot_be_written_leaves_the_ledger_as_it_was(ledger):
     with pytest.raises(ValueError, match="not JSON compliant"):
         ledger.append("ended", {"f": float("nan")})
     assert ledger.path.read_bytes() == before
+
+
+def test_what_was_verified_before_is_verified_again_when_its_bytes_have_changed(ledger):
+    for number in range(3):
+        ledger.append("started", {"trial": f"t-{number}"})
+    content = ledger.path.read_bytes()
+    assert len(ledger.entries()) == 3
+    ledger.path.write_bytes(content.replace(b"t-1", b"t-7"))
+    for ask in (ledger.entries, lambda: ledger.append("ended", {}), Ledger(ledger.path).entries):
+        with pytest.raises(LedgerDamaged, match="line 2 was altered"):
+            ask()
+    ledger.path.write_bytes(content[: content.index(b"\n") + 1])
+    assert [entry.facts["trial"] for entry in ledger.entries()] == ["t-0"]
+
+
+def test_a_ledger_of_years_is_read_in_time_that_its_new_lines_take(ledger, monkeypatch):
+    for number in range(40):
+        ledger.append("started", {"trial": f"t-{number}"})
+    parsed = []
+    monkeypatch.setattr("workers.host.ledger._parsed_entry", lambda line: parsed.append(line) or parse(line))
+    ledger.append("ended", {"trial": "t-39"})
+    ledger.append("started", {"trial": "t-40"})
+    assert len(parsed) == 1
+    assert len(ledger.entries()) == 42
