@@ -74,7 +74,7 @@ def sqlite_errors(path: Path) -> Iterator[None]:
             f"cannot use the journal {path}: {error}; it needs a writable local disk with space left, "
             "and nothing is moved without it"
         ) from error
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise corrupt(path, str(error)) from error
 
 

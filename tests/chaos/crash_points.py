@@ -42,7 +42,7 @@ ELSEWHERE = {
     "workers/hardware/gate.py": {'"who": who': "a person vouches for a folder: a command of its own"},
     "workers/host/serve.py": {
         '"what": "hangs"': "a driver that hangs: tests/workers/host/test_hosted.py",
-        '"refused", "trial": trial, "reason": str(error)': "what no host of ours is ever told: the same",
+        '"refused", "trial": trial, "reason": _reason_of': "what no host of ours is ever told: the same",
     },
     "cluster/hardware/campaign.py": {
         '{"reason": reason}': "no method suggests a controller outside the cube",

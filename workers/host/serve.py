@@ -89,8 +89,8 @@ class Host:
                 self.say(self._run(trial, x, float(message.get("seconds", 0.0))))
             else:
                 raise ValueError(f"a host does plan, run, beat and close, not {message.get('do')!r}")
-        except (ValueError, TypeError, OSError, LedgerDamaged) as error:
-            self.say({"say": "refused", "trial": trial, "reason": str(error)})
+        except Exception as error:  # noqa: BLE001 - a driver may raise anything; nothing has moved
+            self.say({"say": "refused", "trial": trial, "reason": _reason_of(error)})
 
     def close(self) -> None:
         """Come to rest, and let go of the robot."""
@@ -224,6 +224,14 @@ def _require_measurement(measured: Any) -> None:
         raise ValueError(f"evidence must be a SHA-256 in hexadecimal, got {measured['evidence']!r:.80}")
 
 
+def _reason_of(error: Exception) -> str:
+    """What was expected to go wrong says so by itself; all else by its kind, and its traceback in the log."""
+    if isinstance(error, (ValueError, TypeError, OSError, LedgerDamaged, Fault)):
+        return str(error)
+    traceback.print_exc(file=sys.stderr)
+    return _with_place(error)
+
+
 def _meaning_of(error: Exception) -> "tuple[str, str]":
     """What an error means, and its reason."""
     if isinstance(error, Stopped):
@@ -231,6 +239,10 @@ def _meaning_of(error: Exception) -> "tuple[str, str]":
     if isinstance(error, Fault):
         return "fault", str(error)
     traceback.print_exc(file=sys.stderr)
+    return "broke", _with_place(error)
+
+
+def _with_place(error: Exception) -> str:
     place = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{os.path.basename(place.filename)}, line {place.lineno}"  # noqa: PTH119 - a name, no path
-    return "broke", f"{type(error).__name__}: {error} ({where})"
+    return f"{type(error).__name__}: {error} ({where})"

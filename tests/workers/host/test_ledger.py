@@ -76,7 +76,8 @@ def test_what_cannot_be_written_leaves_the_ledger_as_it_was(ledger):
     assert ledger.path.read_bytes() == before
 
 
-def test_what_was_verified_before_is_verified_again_when_its_bytes_have_changed(ledger):
+def test_what_was_verified_before_is_verified_again_when_its_bytes_have_changed(tmp_path):
+    ledger = Ledger(tmp_path / "ledger.jsonl")
     for number in range(3):
         ledger.append("started", {"trial": f"t-{number}"})
     content = ledger.path.read_bytes()
@@ -89,12 +90,13 @@ def test_what_was_verified_before_is_verified_again_when_its_bytes_have_changed(
     assert [entry.facts["trial"] for entry in ledger.entries()] == ["t-0"]
 
 
-def test_a_ledger_of_years_is_read_in_time_that_its_new_lines_take(ledger, monkeypatch):
+def test_of_a_ledger_of_years_only_the_new_lines_are_read(tmp_path, monkeypatch):
+    ledger = Ledger(tmp_path / "ledger.jsonl")
     for number in range(40):
         ledger.append("started", {"trial": f"t-{number}"})
     parsed = []
     monkeypatch.setattr("workers.host.ledger._parsed_entry", lambda line: parsed.append(line) or parse(line))
     ledger.append("ended", {"trial": "t-39"})
     ledger.append("started", {"trial": "t-40"})
-    assert len(parsed) == 1
+    assert len(parsed) == 2
     assert len(ledger.entries()) == 42

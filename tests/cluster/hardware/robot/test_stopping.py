@@ -10,7 +10,15 @@ import pytest
 
 from cluster.errors import UsageError, UserError
 from cluster.hardware.robot import stopping
-from cluster.hardware.robot.residence import enter, home_of, home_of_campaign, limits_of, robot_errors
+from cluster.hardware.robot.account import account
+from cluster.hardware.robot.residence import (
+    enter,
+    home_of,
+    home_of_campaign,
+    homes_of,
+    limits_of,
+    robot_errors,
+)
 from cluster.home import robot_folder
 from workers.host.home import RobotHome
 from workers.host.latch import Latch
@@ -156,3 +164,37 @@ def test_trouble_at_a_robot_is_told_in_words(home):
         home.hold({}),
     ):
         pass
+
+
+def test_a_stop_that_names_the_robot_alone_finds_every_home_of_its_campaigns(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    (tmp_path / "campaign").mkdir()
+    homes = [enter(tmp_path / "campaign", "desk", tmp_path / name) for name in ("one", "two", "one")]
+    usual = home_of("desk", None)
+    assert {each.path for each in homes_of("desk", None)} == {usual.path, *(each.path for each in homes)}
+    stopping.stop("desk", None, "Ada", RUN)
+    assert all(each.latch.is_set for each in homes)
+    assert stopping.clear("desk", None, "Bob", "nothing near it").endswith(RUN)
+    assert not any(each.latch.is_set for each in homes)
+    assert homes_of("desk", tmp_path / "one") == (homes[0],)
+
+
+def test_what_is_true_of_a_robot_is_told_for_every_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with pytest.raises(UserError, match="no campaign of 'desk' was ever begun here"):
+        list(account("desk", None))
+    (tmp_path / "campaign").mkdir()
+    home = enter(tmp_path / "campaign", "desk", tmp_path / "one")
+    home.ledger.append("started", {"trial": "a"})
+    home.ledger.append("ended", {"trial": "a", "commands": 7, "seconds": 2.0, "travel": {"hip": 1.5}})
+    stopping.stop("desk", home.path, "Ada", "it smells")
+    with home.hold({"campaign": "/campaigns/one", "pid": 7, "host": "bench"}):
+        said = "\n".join(account("desk", home.path))
+    for words in (
+        f"desk: its home is {home.path}",
+        "held by the campaign in /campaigns/one (process 7 on bench)",
+        "stopped by Ada",
+        "moved by 1 trials: 7 commands in 2.0 s of motion",
+        "hip",
+    ):
+        assert words in said
