@@ -39,11 +39,11 @@ def main() -> None:
                 campaigns += 1
             trials += len(taken)
             megabytes, files = process.memory_info().rss / 1e6, process.num_fds()
-            middle = statistics.median(taken) * 1e3
+            middle, ledger = statistics.median(taken) * 1e3, (folder / "home" / "ledger.jsonl").stat().st_size
             print(
                 f"{(time.monotonic() - began) / 60:5.1f} min: {trials} trials in {campaigns} campaigns, "
                 f"{megabytes:.0f} MB, {files} open files, {len(process.children())} processes at the robot, "
-                f"median trial {middle:.0f} ms, ledger {(folder / 'home' / 'ledger.jsonl').stat().st_size} bytes, "
+                f"median trial {middle:.0f} ms, ledger {ledger} bytes, "
                 f"load {os.getloadavg()[0]:.1f}",
                 flush=True,
             )

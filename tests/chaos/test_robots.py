@@ -143,6 +143,8 @@ def test_a_parent_that_dies_or_stops_at_any_moment_leaves_a_robot_at_rest(proces
     for number in range(ROUNDS):
         home, folder, log = (lab / f"{name}-{number}" for name in ("home", "campaign", "log"))
         monkeypatch.setenv("ARM_LOG", os.fspath(log))
+        home.mkdir()
+        (home / "limits.toml").write_text(f"silence = {SILENCE}\n")
         process = start(processes, folder, lab, home, 1, "told")
         while not commands(log) and process.is_alive():
             time.sleep(0.01)
@@ -164,8 +166,8 @@ def test_a_parent_that_dies_or_stops_at_any_moment_leaves_a_robot_at_rest(proces
     assert hit == ROUNDS
 
 
-SILENCE = 15.0
-"""A rehearsal's host stops after so many seconds without a sign of life."""
+SILENCE = 1.0
+"""The host stops after so many seconds without a sign of life, as its limits say."""
 
 
 def is_alive(pid):

@@ -68,6 +68,7 @@ class HostedRobot:
         self._limits = limits
         self._period = period
         self._host: HostProcess | None = None
+        self._planned: dict[str, tuple[bytes, Planned]] = {}
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -91,12 +92,17 @@ class HostedRobot:
         Raises:
             RobotFault: the host does not start, or does not answer.
         """
+        known = self._planned.get(trial_id)
+        if known is not None and known[0] == x.tobytes():
+            return known[1]
         answer = self._ask({"do": "plan", "trial": trial_id, "x": protocol.encode(x.tolist())})
         if answer["say"] != "planned":
             raise RobotFault(f"the plan of {trial_id} could not be made: {answer.get('reason')}")
-        return Planned(
+        planned = Planned(
             answer["seconds"], answer["steps"], tuple(answer["channels"]), str(answer["objection"])
         )
+        self._planned = {trial_id: (x.tobytes(), planned)}  # the host looks at it once more before it moves
+        return planned
 
     def run(self, trial_id: str, x: Float[np.ndarray, " D"]) -> Measurement:
         """Move the robot once; see `RobotDriver.run`.
