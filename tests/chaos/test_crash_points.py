@@ -28,13 +28,12 @@ TOLD = 3
 """The exit code of a command that ended with a message for its user."""
 HOST = ("workers/host/serve.py", "workers/host/motion.py", "workers/host/recording.py")
 BOTH = "workers/host/durable.py"
-LAB = """
+ARM = """
 import os
 import threading
 from pathlib import Path
 from tests.chaos.crash_points import watch
 from tests.workers.host.arm import Arm
-from workers.hardware.robots import Robot
 from workers.host import stop
 from workers.host.home import RobotHome
 from workers.host.latch import Stop
@@ -56,9 +55,13 @@ class FrailArm(Arm):
             raise ZeroDivisionError("a division in the driver")
         if self._sent == 3 and self._x[0] < 0.5:
             stop.request(self._home, Stop("Bob", "it smells"), 0.01)
+"""
+LAB = """
+import os
+from workers.hardware.robots import Robot
 
 ARM = Robot(
-    "arm", "quadratic-30d", "lab_of_points:FrailArm", simulated=True,
+    "arm", "quadratic-30d", "frail_arm:FrailArm", simulated=True,
     settings={"log": os.environ["ARM_LOG"], "steps": 6, "home": ""},
 )
 """
@@ -118,6 +121,7 @@ def decide(folder, home, environment, number, stops):
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
     (tmp_path / "lab_of_points.py").write_text(LAB)
+    (tmp_path / "frail_arm.py").write_text(ARM)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
     monkeypatch.setenv("POINTS_LOG", os.fspath(tmp_path / "points.log"))
