@@ -90,13 +90,13 @@ GUARDS = (
         "workers/host/serve.py",
         "if self.home.latch.is_set:",
         "if False:",
-        (HOSTED, "meets_no_host"),
+        ("tests/contracts/test_drivers.py", "stopped_robot"),
     ),
     Guard(
         "a motion that the ledger does not know",
         "workers/host/serve.py",
-        "        ledger.append(STARTED,",
-        "        list((STARTED,",
+        "        ledger.append(STARTED, {",
+        "        dict(started={",
         (HOSTED, "ledger_knows_before_and_after"),
     ),
     Guard(
