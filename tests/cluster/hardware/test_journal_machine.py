@@ -102,6 +102,14 @@ JournalMachine.TestCase.settings = settings(
 TestJournal = JournalMachine.TestCase
 
 
+class JournalAtLength(JournalMachine):
+    """The same, forty times as often."""
+
+
+JournalAtLength.TestCase.settings = settings(JournalMachine.TestCase.settings, max_examples=1000)
+TestJournalAtLength = pytest.mark.slow(JournalAtLength.TestCase)
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
