@@ -102,6 +102,16 @@ def idle(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
 
 
 @contextmanager
+def granted(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
+    """A trial was granted a moment ago, and is run a moment after the stop: it must not send a command."""
+    with robot_in(folder) as (robot, log):
+        yield robot.home, log
+        run_through(robot)
+        if commands(log):
+            raise AssertionError(f"{len(commands(log))} commands were sent to a stopped robot")
+
+
+@contextmanager
 def running(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
     """A host in the middle of a motion."""
     with robot_in(folder) as (robot, log):
@@ -124,18 +134,34 @@ def without_socket(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
 @contextmanager
 def driver_stopped(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
     """A motion whose driving process was stopped by SIGSTOP a moment ago."""
+    with driving_process(folder, "") as (process, log):
+        process.send_signal(signal.SIGSTOP)
+        yield RobotHome(folder, "desk"), log
+
+
+@contextmanager
+def driver_busy(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
+    """A motion whose driving process computes something else all the while, as an actor in a long call."""
+    spin = "threading.Thread(target=lambda: [sum(range(1000)) for _ in iter(int, 1)], daemon=True).start()"
+    with driving_process(folder, spin) as (_, log):
+        yield RobotHome(folder, "desk"), log
+
+
+@contextmanager
+def driving_process(folder: Path, before: str) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
+    """Another process in the middle of a motion."""
     log = folder / "commands.log"
     script = (
-        "import sys; sys.path.insert(0, '.')\n"
+        "import sys, threading; sys.path.insert(0, '.')\n"
         "from benchmarks.stopping import robot_in, run_through\nfrom pathlib import Path\n"
+        f"{before}\n"
         f"with robot_in(Path({str(folder)!r})) as (robot, _): run_through(robot)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT)
     while len(commands(log)) < 5:
         time.sleep(0.002)
-    process.send_signal(signal.SIGSTOP)
     try:
-        yield RobotHome(folder, "desk"), log
+        yield process, log
     finally:
         process.kill()
         process.wait()
@@ -144,7 +170,9 @@ def driver_stopped(folder: Path) -> Iterator[tuple[RobotHome, Path]]:
 
 STATES: dict[str, Callable[[Path], AbstractContextManager[tuple[RobotHome, Path]]]] = {
     "idle": idle,
+    "granted": granted,
     "running": running,
+    "driver-busy": driver_busy,
     "without-socket": without_socket,
     "driver-stopped": driver_stopped,
 }
