@@ -26,8 +26,6 @@ class Pulse:
 
     Attributes:
         moving: whether commands are being sent.
-        last_command: when the last one was sent, in s of `now`; 0 before the first.
-        commands: how many were sent in this motion.
         late: how many of them came more than a period after their time.
         over: whether the motion under way has ended, however it did.
         at_rest: whether the robot stands still; not where its driver failed to stop it.
@@ -35,12 +33,15 @@ class Pulse:
     """
 
     moving: bool = False
-    last_command: float = 0.0
-    commands: int = 0
     late: int = 0
     over: threading.Event = field(default_factory=threading.Event)
     at_rest: bool = True
     sent: list[tuple[float, ...]] = field(default_factory=list)
+
+    @property
+    def last_command(self) -> float:
+        """When the last command was sent, in s of `now`; 0 before the first."""
+        return self.sent[-1][0] if self.sent else 0.0
 
 
 def run(
@@ -64,10 +65,9 @@ def run(
         Fault: the robot broke off by itself.
         NotAtRest: the driver failed to bring the robot to rest.
     """
+    pulse.late, pulse.sent = 0, []
     machine.begin(x)
     guard.beat = now()  # getting ready may take any time, and moves nothing
-    pulse.commands = pulse.late = 0
-    pulse.sent = []
     pulse.over = threading.Event()
     pulse.moving, pulse.at_rest = True, False
     try:
@@ -102,9 +102,8 @@ def _stream(machine: RobotMachine, watch: LimitWatch, guard: Guard, pulse: Pulse
         if found:
             raise Stopped(found)
         machine.send(command)
-        pulse.last_command = now()
-        pulse.sent.append((pulse.last_command, *command))
-        pulse.commands, step = pulse.commands + 1, step + 1
+        pulse.sent.append((now(), *command))
+        step += 1
         pulse.late += period > 0 and time.monotonic() > due + 2 * period
         due = max(due + period, time.monotonic() - period)
 

@@ -37,14 +37,14 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]
 
     Args:
         path: of the file.
-        header: a name for each column, without commas or quotation marks.
+        header: a name for each column; a comma in it becomes a space.
         rows: numbers, one for each column.
 
     Raises:
         OSError: the disk is full or broken.
     """
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(header) + "\n")
+        file.write(",".join(name.replace(",", " ") for name in header) + "\n")
         for row in rows:
             file.write(",".join(repr(float(value)) for value in row) + "\n")
 

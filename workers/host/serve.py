@@ -121,34 +121,34 @@ class Host:
         ledger = self.home.ledger
         self.guard.deadline = now() + min(seconds, self.limits.duration)
         self.guard.beat = now()
+        watch = LimitWatch(self.limits, self.machine.channels, self.machine.period)
         ledger.append(STARTED, {"trial": trial, "x": hashlib.sha256(protocol.encode(x).encode()).hexdigest()})
         self.say({"say": "started", "trial": trial})
-        watch = LimitWatch(self.limits, self.machine.channels, self.machine.period)
         try:
             measured = motion.run(self.machine, x, watch, self.guard, self.pulse, self.period)
             _require_measurement(measured)
-            ledger.append(ENDED, {"trial": trial, "measurement": measured, **self._commands()})
+            facts = {"trial": trial, "measurement": measured, **self._commands()}
+            ledger.append(ENDED, facts)
         except Exception as error:  # noqa: BLE001 - a driver may raise anything, and the robot may have moved
             what, reason = self._note_break(trial, *_meaning_of(error))
             return {"say": what, "trial": trial, "reason": reason}
         finally:
             self._record_commands(folder)
-        return {"say": "ended", "trial": trial, "measurement": measured, **self._commands()}
+        return {"say": "ended", **facts}
 
     def _record_commands(self, folder: Path) -> None:
-        """Keep what was sent; a full disk must not change what became of the trial."""
-        header = ["seconds", *(channel.name.replace(",", " ") for channel in self.machine.channels)]
-        began = self.pulse.sent[0][0] if self.pulse.sent else 0.0
-        with suppress(OSError):
+        """Keep what was sent; whatever goes wrong here must not change what became of the trial."""
+        with suppress(Exception):
+            began = self.pulse.sent[0][0] if self.pulse.sent else 0.0
             rows = ((at - began, *command) for at, *command in self.pulse.sent)
-            write_table(folder / COMMANDS, header, rows)
+            write_table(folder / COMMANDS, ["seconds", *(each.name for each in self.machine.channels)], rows)
 
     def _note_break(self, trial: str, what: str, reason: str) -> "tuple[str, str]":
         """Tell the ledger how a motion ended; where it takes no more, nobody knows what the robot did."""
         try:
             facts = {"trial": trial, "what": what, "reason": reason, **self._commands()}
             self.home.ledger.append(BROKEN, facts)
-        except (OSError, LedgerDamaged) as error:
+        except Exception as error:  # noqa: BLE001 - once a trial has started, nothing may call it unmoved
             return "broke", f"{reason}; and the ledger could not be written: {error}"
         return what, reason
 
@@ -169,7 +169,7 @@ class Host:
     def _commands(self) -> "dict[str, Any]":
         pulse = self.pulse
         return {
-            "commands": pulse.commands,
+            "commands": len(pulse.sent),
             "late": pulse.late,
             "last_command": pulse.last_command,
             "seconds": pulse.sent[-1][0] - pulse.sent[0][0] if pulse.sent else 0.0,

@@ -89,7 +89,7 @@ def _simulation_lines(found: Mapping[str, Any]) -> Iterator[str]:
         yield f"  least distance to what it must keep away from: {found['clearance']:.3f} m"
     speeds = [f"{speed:.2f} {unit}" for unit, speed in found.get("fastest", {}).items()]
     if speeds:
-        yield f"  top speed: {', '.join(speeds)}"
+        yield f"  fastest change of what is seen: {', '.join(speeds)}"
 
 
 def _parameters(x: Sequence[Mapping[str, Any]]) -> Iterator[str]:

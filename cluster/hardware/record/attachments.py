@@ -100,9 +100,10 @@ def attach(folder: Path, trial: int, path: Path, who: str, note: str) -> Attachm
     if not path.is_file():
         raise UsageError(f"there is no file {path} to attach: name one")
     try:
+        listed = attachments(folder)  # a damaged list takes no more, and no copy is made
         digest, size, unfinished = _copy(path, folder / FOLDER)
         made = Attachment(trial, path.name, digest, size, who, note, "")
-        known = [each for each in attachments(folder) if (each.trial, each.sha256) == (trial, digest)]
+        known = [each for each in listed if (each.trial, each.sha256) == (trial, digest)]
         unfinished.replace(folder / made.file)
         durable.sync_folder(folder / FOLDER)
         if known:

@@ -57,7 +57,7 @@ def export(folder: Path, form: str, out: Path | None) -> str:
         with opening.to_read(folder) as journal, replacing(out) as unfinished:
             pyarrow.parquet.write_table(as_table(rows(journal)), unfinished)
         return ""
-    text = FORMS[form](folder)
+    text = TEXTS[form](folder)
     if out is None:
         return text
     write_text(out, text)
@@ -80,15 +80,14 @@ def report(folder: Path, out: Path) -> None:
     write_text(out, text)
 
 
-def _table(folder: Path) -> str:
+def _journal(folder: Path) -> str:
+    return "".join(f"{line}\n" for line in lines(folder))
+
+
+def _csv(folder: Path) -> str:
     with opening.to_read(folder) as journal:
         return as_csv(rows(journal))
 
 
-FORMS: Final[Mapping[str, Callable[[Path], str]]] = MappingProxyType(
-    {
-        "jsonl": lambda folder: "".join(f"{line}\n" for line in lines(folder)),
-        "csv": _table,
-        PARQUET: _table,
-    }
-)
+TEXTS: Final[Mapping[str, Callable[[Path], str]]] = MappingProxyType({"jsonl": _journal, "csv": _csv})
+FORMS: Final = (*TEXTS, PARQUET)

@@ -4,6 +4,7 @@ import io
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -95,8 +96,7 @@ def _figure(measured: Sequence[Mapping[str, Any]]) -> str:
 def _draw_objectives(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
     numbers = [row["trial"] for row in measured]
     f = [row["f"] for row in measured]
-    best = [max(f[: count + 1]) for count in range(len(f))]
-    axes.step(numbers, best, where="post", color=_BEST, label="best so far")
+    axes.step(numbers, list(accumulate(f, max)), where="post", color=_BEST, label="best so far")
     axes.plot(numbers, f, "o", color=_MEASURED, label="measured")
     simulated = [(row["trial"], row["simulated_f"]) for row in measured if row["simulated_f"] is not None]
     if simulated:

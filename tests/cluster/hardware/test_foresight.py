@@ -37,7 +37,14 @@ def test_a_trial_that_waits_is_simulated_and_drawn_in_the_units_of_the_robot(wai
     values = [each["value"] for each in now.motion["x"]]
     np.testing.assert_allclose(values, setup.controller.values(trial.x.astype(np.float32)))
     said = "\n".join(motion_lines(now.motion))
-    for words in ("simulated 3 times", "badness", "top speed", "keep away from", "rad/s", "its controller:"):
+    for words in (
+        "simulated 3 times",
+        "badness",
+        "fastest change of what is seen",
+        "keep away from",
+        "rad/s",
+        "its controller:",
+    ):
         assert words in said
     with Image.open(now.motion["clip"]) as clip:
         assert (clip.format, clip.size) == ("GIF", (320, 240))

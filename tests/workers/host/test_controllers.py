@@ -97,3 +97,39 @@ def test_nothing_outside_the_limits_reaches_the_robot(times, tmp_path):
                 if number > 1:
                     assert max(abs(a - b) / PERIOD for a, b in zip(new, rates, strict=True)) <= 4000.0
                 rates = new
+
+
+class Unready(Liar):
+    """It gets ready once, and never again."""
+
+    def begin(self, x):
+        if self.sent:
+            raise RuntimeError("the arm is not homed")
+        super().begin(x)
+
+
+def test_a_motion_that_does_not_begin_has_none_of_the_commands_of_the_one_before(tmp_path):
+    said, home = [], RobotHome(tmp_path / "home", "desk").make()
+    host = Host(home, Unready(random.Random(2)), RobotLimits(), said.append, 0.0)
+    for number in range(2):
+        x = struct.pack("<3d", 0.1, 0.1, 0.1).hex()
+        host.answer({"do": "run", "trial": f"desk-{number}", "x": x, "seconds": 5.0})
+    assert said[-1]["say"] == "broke"
+    assert home.ledger.entries()[-1].facts["commands"] == 0
+    rows = (home.trials / "desk-1" / "commands.csv").read_text(encoding="utf-8").splitlines()
+    assert rows == ["seconds,hip,knee"]
+
+
+def test_once_a_trial_has_started_nothing_calls_it_unmoved(tmp_path, monkeypatch):
+    said, home = [], RobotHome(tmp_path / "home", "desk").make()
+    host = Host(home, Liar(random.Random(2)), RobotLimits(), said.append, 0.0)
+
+    def fails(*_):
+        raise RuntimeError("a mistake of ours")
+
+    for name in ("travel", "write_table"):
+        monkeypatch.setattr(f"workers.host.serve.{name}", fails)
+    host.answer(
+        {"do": "run", "trial": "desk-0", "x": struct.pack("<3d", 0.1, 0.1, 0.1).hex(), "seconds": 5.0}
+    )
+    assert [message["say"] for message in said] == ["started", "broke"]
