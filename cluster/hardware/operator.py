@@ -4,7 +4,7 @@ from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
 
-from cluster.errors import UsageError
+from cluster.errors import UsageError, UserError
 from cluster.hardware import campaign, lock
 from cluster.hardware.events import CampaignTrial, utc_now
 from cluster.hardware.journal import Journal
@@ -24,6 +24,10 @@ VALID_MINUTES = 60.0
 """An approval holds so long, unless a person says otherwise."""
 
 
+class Outdated(UserError):  # noqa: N818 - names the state of what was seen
+    """The trial is no longer what the person saw when they decided."""
+
+
 def status(folder: Path) -> Status:
     """How the campaign in a folder stands; nothing is written, so that a copy on read-only media will do.
 
@@ -34,7 +38,9 @@ def status(folder: Path) -> Status:
         return look(opened, lock.holder(folder), _gate(folder, opened))
 
 
-def approve(folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES) -> CampaignTrial:
+def approve(
+    folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES, seen: int | None = None
+) -> CampaignTrial:
     """Lets a checked trial onto the robot; bound to the controller, to the robot's limits, and for a while.
 
     Args:
@@ -42,11 +48,13 @@ def approve(folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES) 
         trial: its number.
         who: approves; recorded for good.
         minutes: that the approval holds.
+        seen: version of the trial that the person looked at; None for the present one.
 
     Returns:
         The approved trial.
 
     Raises:
+        Outdated: the trial has changed since it was looked at.
         UsageError: nobody is named, or the time is none.
         IllegalTransition: when the trial does not wait for approval.
     """
@@ -55,29 +63,32 @@ def approve(folder: Path, trial: int, who: str, minutes: float = VALID_MINUTES) 
     with opening.to_write(folder) as opened, residence.robot_errors():
         until = utc_now() + timedelta(minutes=minutes)
         bounds = {"limits": _gate(folder, opened).approval()["limits"], "until": until.isoformat()}
-        return campaign.approve(opened, opened.trial(trial), _require_name(who), bounds)
+        return campaign.approve(opened, _trial_as_seen(opened, trial, seen), _require_name(who), bounds)
 
 
-def withdraw(folder: Path, trial: int, who: str) -> CampaignTrial:
+def withdraw(folder: Path, trial: int, who: str, seen: int | None = None) -> CampaignTrial:
     """Takes an approval back, as long as the trial was not granted.
 
     Args:
         folder: of the campaign.
         trial: its number.
         who: decides; recorded for good.
+        seen: version of the trial that the person looked at; None for the present one.
 
     Returns:
         The trial, which waits for approval again.
 
     Raises:
+        Outdated: the trial has changed since it was looked at.
         IllegalTransition: when the trial is not approved, or was granted already.
     """
     with opening.to_write(folder) as opened:
         facts = {"reason": "the approval was withdrawn"}
-        return campaign.record(opened, opened.trial(trial), State.CHECKED, _require_name(who), facts)
+        now = _trial_as_seen(opened, trial, seen)
+        return campaign.record(opened, now, State.CHECKED, _require_name(who), facts)
 
 
-def reject(folder: Path, trial: int, who: str, note: str) -> CampaignTrial:
+def reject(folder: Path, trial: int, who: str, note: str, seen: int | None = None) -> CampaignTrial:
     """Keeps a trial off the robot; neither its controller nor one near it is ever suggested again.
 
     Args:
@@ -85,11 +96,13 @@ def reject(folder: Path, trial: int, who: str, note: str) -> CampaignTrial:
         trial: its number.
         who: decides; recorded for good.
         note: why; recorded for good.
+        seen: version of the trial that the person looked at; None for the present one.
 
     Returns:
         The rejected trial.
 
     Raises:
+        Outdated: the trial has changed since it was looked at.
         UsageError: nobody is named, or nothing is noted.
         IllegalTransition: when the trial was granted already, or has ended.
     """
@@ -97,7 +110,8 @@ def reject(folder: Path, trial: int, who: str, note: str) -> CampaignTrial:
         raise UsageError("a rejection needs a note that says why, got nothing; give --note TEXT")
     with opening.to_write(folder) as opened:
         facts = {"reason": note.strip()}
-        return campaign.record(opened, opened.trial(trial), State.REJECTED, _require_name(who), facts)
+        now = _trial_as_seen(opened, trial, seen)
+        return campaign.record(opened, now, State.REJECTED, _require_name(who), facts)
 
 
 def adopt(folder: Path, who: str, home: Path | None) -> None:
@@ -126,6 +140,7 @@ def resolve(
     f: float | None,
     y: float | None,
     confirmed: float | None = None,
+    seen: int | None = None,
 ) -> CampaignTrial:
     """Says what became of an unknown trial, or amends a measured one; the old value stays in the events.
 
@@ -138,11 +153,13 @@ def resolve(
         f: objective of a measured trial; None otherwise.
         y: badness in [0, 1] of a measured trial; None otherwise.
         confirmed: the objective once more, where it lies outside what the setup says is possible.
+        seen: version of the trial that the person looked at; None for the present one.
 
     Returns:
         The trial with its outcome.
 
     Raises:
+        Outdated: the trial has changed since it was looked at.
         UsageError: when an argument is missing, too much, or out of its range.
         IllegalTransition: when the trial is neither unknown nor, for an amendment, measured.
         FolderTaken: when the trial is running at this moment.
@@ -151,11 +168,18 @@ def resolve(
     close_abandoned(folder, patience=0.0)
     with opening.to_write(folder) as opened:
         _require_possible(opened, f, confirmed)
-        return campaign.record(opened, opened.trial(trial), new, _require_name(who), body)
+        return campaign.record(opened, _trial_as_seen(opened, trial, seen), new, _require_name(who), body)
 
 
 def amend(
-    folder: Path, trial: int, who: str, note: str, f: float, y: float, confirmed: float | None = None
+    folder: Path,
+    trial: int,
+    who: str,
+    note: str,
+    f: float,
+    y: float,
+    confirmed: float | None = None,
+    seen: int | None = None,
 ) -> CampaignTrial:
     """Corrects what a trial measured; the old value stays in the events.
 
@@ -167,11 +191,13 @@ def amend(
         f: objective.
         y: badness in [0, 1].
         confirmed: the objective once more, where it lies outside what the setup says is possible.
+        seen: version of the trial that the person looked at; None for the present one.
 
     Returns:
         The trial as amended.
 
     Raises:
+        Outdated: the trial has changed since it was looked at.
         UsageError: when an argument is missing or out of its range, or the trial was not measured.
     """
     with opening.to_read(folder) as opened:
@@ -180,7 +206,7 @@ def amend(
         raise UsageError(
             f"only a measured trial can be amended, trial {trial} is {state}; an unknown one is resolved"
         )
-    return resolve(folder, trial, State.MEASURED, who, note, f, y, confirmed)
+    return resolve(folder, trial, State.MEASURED, who, note, f, y, confirmed, seen)
 
 
 def close_abandoned(folder: Path, patience: float) -> None:
@@ -250,6 +276,18 @@ def _require_possible(opened: Journal, f: float | None, confirmed: float | None)
             f"the objective of {opened.identity.setup} must lie in [{low:g}, {high:g}], got {f:g}, and one "
             f"outside misleads every later suggestion; if it is meant, type it again with --confirm {f:g}"
         )
+
+
+def _trial_as_seen(opened: Journal, number: int, seen: int | None) -> CampaignTrial:
+    """A trial, if it still is what a person saw; that it stays so until the event is the journal's matter."""
+    trial = opened.trial(number)
+    if seen is not None and trial.version != seen:
+        last = opened.last_event(number)
+        raise Outdated(
+            f"trial {number} has changed since this was looked at: it is {trial.state} now, by {last.who}; "
+            "nothing was done. Look again, then decide"
+        )
+    return trial
 
 
 def _require_name(who: str) -> str:

@@ -91,7 +91,7 @@ class TrainingJob:
 
     def settings(self, cache: TrainingCache) -> Preset:
         """The preset for this data, with the job's seed and budget."""
-        planned = planned_channels(self.origin["setup"]) if self.changes.get("prior") == "plan" else 0
+        planned = planned_channels(self.origin["setup"])
         sizes = Sizes(cache.x.shape[1], cache.xi.shape[1], cache.xi.shape[2], planned)
         made = vary(preset(self.preset)(sizes), self.changes)
         training = replace(made.training, seed=self.seed)

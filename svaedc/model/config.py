@@ -63,7 +63,8 @@ class ModelConfig:
         channels: Convolution channels of q, reversed in the `deconv` trunk of p(xi|tau).
         decoder_hidden: Hidden units of the `mlp` trunk of p(xi|tau).
         rank: Coefficients of the low-rank head.
-        prior_hidden: Channels (`deconv`) or hidden units (`mlp`) of p(tau, psi|x).
+        prior_hidden: Channels (`deconv`) or hidden units (`mlp`) of p(tau, psi|x); for `plan`, filters of the
+            convolution, units of each recurrent layer, and hidden units.
         badness_hidden: Hidden units of p(y|psi).
         latent_scale: Bounds of the latent scales; they start at the geometric mean.
         observation_scale: Bounds of the scales of xi: in units of the mean absolute residual of each
@@ -110,6 +111,11 @@ class ModelConfig:
             raise ValueError(
                 "the prior `plan` needs a controller that offers its plan, got one of "
                 f"{self.plan_channels} channels and {self.plan_steps} steps: choose the prior `mlp`"
+            )
+        if self.prior == "plan" and len(self.prior_hidden) < 3:
+            raise ValueError(
+                "the prior `plan` needs at least 3 hidden sizes (filters, recurrent units, hidden units), "
+                f"got {self.prior_hidden}"
             )
         if encoded_length(self.time_steps, len(self.channels)) < 1:
             raise ValueError(

@@ -146,26 +146,33 @@ PlanOf = Callable[[Tensor], Tensor]
 class PlanPrior(nn.Module):
     """p(tau, psi|x) that reads a controller's plan as a sequence, a departure: x hides what a plan shows.
 
-    Recurrent layers (GRU) as wide as `prior_hidden` says; the latent code is read from the last state, from
-    the mean over time and from x. What computes plans is code of the robot, and no part of the weights.
+    A convolution that halves the steps, recurrent layers (GRU), and one hidden layer over the last state, the
+    mean and the largest values over time, and x; `prior_hidden` has their sizes in this order. What computes
+    plans is code of the robot, and no part of the weights.
     """
 
     def __init__(self, config: ModelConfig) -> None:
         """Build from the sizes in `config`; `plan_of` is to be set before use."""
         super().__init__()
         self.plan_of: PlanOf | None = None
-        width, layers = config.prior_hidden[0], len(config.prior_hidden)
-        self.recurrent = nn.GRU(config.plan_channels, width, layers, batch_first=True)
-        self.dropout = nn.Dropout(0.0)
-        self.latent = LatentHead(2 * width + config.controller_dim, config)
+        filters, *widths, hidden = config.prior_hidden
+        self.convolution = nn.Conv1d(config.plan_channels, filters, 5, stride=2, padding=2)
+        layers = pairwise((filters, *widths))
+        self.recurrent = nn.ModuleList(nn.GRU(before, width, batch_first=True) for before, width in layers)
+        self.summary = nn.Linear(3 * widths[-1] + config.controller_dim, hidden)
+        self.dropouts = nn.ModuleList(nn.Dropout(0.0) for _ in range(2))
+        self.latent = LatentHead(hidden, config)
 
     def forward(self, x: Float[Tensor, "batch controller"]) -> Diagonal:
         """Distribution of the latent code of each controller."""
         if self.plan_of is None:
             raise RuntimeError("this model reads plans: set plan_of to what computes those of its robot")
-        states, _ = self.recurrent(self.plan_of(x).swapaxes(1, 2))
-        features = torch.cat([states[:, -1], states.mean(dim=1), 2.0 * x - 1.0], dim=1)
-        return self.latent(self.dropout(features))
+        states = torch.relu(self.convolution(self.plan_of(x))).swapaxes(1, 2)
+        for layer in self.recurrent:
+            states, _ = layer(states)
+        seen = [states[:, -1], states.mean(dim=1), states.amax(dim=1), 2.0 * x - 1.0]
+        before, after = self.dropouts
+        return self.latent(after(torch.relu(self.summary(before(torch.cat(seen, dim=1))))))
 
 
 PRIORS = {"mlp": MlpPrior, "deconv": DeconvPrior, "plan": PlanPrior}

@@ -69,13 +69,12 @@ def paper(sizes: Sizes) -> Preset:
 
 
 def compact(sizes: Sizes) -> Preset:
-    """Ours: low-rank head around the median, MLPs, and generation in the objective; minutes on two cores.
+    """Ours: low-rank head around the median, and generation in the objective; minutes on two cores.
 
-    Its stride leaves 100 or 200 steps. On 20,506 Franka episodes, measured on 2,278 others after
-    150 CPU seconds with one thread: error relative to the median's .39 reconstructed and .59 generated from
-    x; correlation of y .99 and .86; all 9 latent dimensions active. Without generation in the objective the
-    generated error was .69, and a second stage that refits p(tau, psi|x) alone made .60 of .59
-    (docs/results/models.md has the table), so that stage has no updates here.
+    p(tau, psi|x) reads the controller's plan where it offers one, and is an MLP where it does not. The stride
+    leaves 100 or 200 steps. Without generation in the objective the error of what is generated from x was .69
+    of the median's instead of .59, and a second stage that refits p(tau, psi|x) alone made .60 of .59: it has
+    no updates here. docs/results/models.md has the tables.
     """
     joint = StageSettings(
         updates=4_000,
@@ -93,7 +92,8 @@ def compact(sizes: Sizes) -> Preset:
         sizes.time_steps,
         plan_channels=sizes.plan_channels,
     )
-    return Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["hybrid"], batch_size=128))
+    made = Preset(model, TrainingSettings(joint, prior, WEIGHTINGS["hybrid"], batch_size=128))
+    return _prior(made, "plan") if sizes.plan_channels else made
 
 
 PRESETS: Final[dict[str, Callable[[Sizes], Preset]]] = {"paper": paper, "compact": compact}
@@ -137,8 +137,10 @@ LATENT_SIZES: Final = {
 _PRIOR_HIDDEN: Final = {
     "mlp": (384, 384, 384),
     "deconv": (512, 256, 128, 128),
-    "plan": (160, 160),
+    "plan": (96, 160, 160, 256),
 }
+_REGULARISED: Final = {"mlp": (0.0, 0.0), "deconv": (0.0, 0.0), "plan": (0.1, 1e-2)}
+"""Dropout and weight decay: what reads plans can learn them by heart."""
 
 
 def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
@@ -199,7 +201,10 @@ def _head(preset: Preset, value: str) -> Preset:
 
 def _prior(preset: Preset, value: str) -> Preset:
     hidden = _chosen("prior", value, _PRIOR_HIDDEN)
-    return preset._replace(model=replace(preset.model, prior=value, prior_hidden=hidden))
+    dropout, decay = _REGULARISED[value]
+    joint = replace(preset.training.joint, dropout=dropout, weight_decay=decay)
+    model = replace(preset.model, prior=value, prior_hidden=hidden)
+    return Preset(model, replace(preset.training, joint=joint))
 
 
 def _weighting(preset: Preset, value: str) -> Preset:

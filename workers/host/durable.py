@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,26 +33,58 @@ def append(path: Path, content: bytes) -> None:
         sync_folder(path.parent)
 
 
-def replace(path: Path, content: bytes) -> None:
+def replace(path: Path, content: bytes, mode: int = 0o666) -> None:
     """Write a file whole, or leave it as it was.
 
     Args:
         path: of the file.
         content: all of it.
+        mode: permissions of the file, from which the user's mask takes some away.
 
     Raises:
         OSError: the disk is full or broken.
     """
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}.unfinished")
+    with _written_beside(path, content, mode) as unfinished:
+        unfinished.replace(path)
+    sync_folder(path.parent)
+
+
+def create(path: Path, content: bytes) -> bool:
+    """Write a file whole, unless there is one; of several who try at once, one succeeds.
+
+    Args:
+        path: of the file.
+        content: all of it.
+
+    Returns:
+        Whether it was not there before.
+
+    Raises:
+        OSError: the disk is full or broken.
+    """
+    with _written_beside(path, content) as unfinished:
+        try:
+            os.link(unfinished, path)
+        except FileExistsError:
+            return False
+        except OSError:  # a file system without hard links
+            unfinished.replace(path)
+    sync_folder(path.parent)
+    return True
+
+
+@contextmanager
+def _written_beside(path: Path, content: bytes, mode: int = 0o666) -> Iterator[Path]:
+    """The bytes on disk under another name, which is gone in the end."""
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}.unfinished")
     try:
-        with unfinished.open("wb") as file:
+        with open(unfinished, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        unfinished.replace(path)
+        yield unfinished
     finally:
         unfinished.unlink(missing_ok=True)
-    sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:

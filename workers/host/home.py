@@ -68,6 +68,11 @@ class RobotHome:
         return self.path / "host.log"
 
     @property
+    def live(self) -> Path:
+        """What is seen of the motion under way; the file may be missing."""
+        return self.path / "live.json"
+
+    @property
     def trials(self) -> Path:
         """Where what was recorded of trials lies, in a folder of each, until their campaign has taken it."""
         return self.path / "trials"

@@ -41,18 +41,22 @@ class Latch:
         """Whether the robot is stopped; one look at the file's name, cheap enough for every command."""
         return self.path.exists()
 
-    def set(self, stop: Stop) -> None:
+    def set(self, stop: Stop) -> bool:
         """Stop the robot; an earlier stop stays the one that is told.
 
         Args:
             stop: why.
 
+        Returns:
+            Whether it was not stopped before.
+
         Raises:
             OSError: the disk is full or broken.
         """
-        if not self.is_set:
-            at = datetime.now(timezone.utc).isoformat(timespec="seconds")  # noqa: UP017 - also for Python 3.10
-            durable.replace(self.path, json.dumps({**asdict(stop), "at": at}).encode() + b"\n")
+        if self.is_set:
+            return False
+        at = datetime.now(timezone.utc).isoformat(timespec="seconds")  # noqa: UP017 - also for Python 3.10
+        return durable.create(self.path, json.dumps({**asdict(stop), "at": at}).encode() + b"\n")
 
     def read(self) -> "Stop | None":
         """Why the robot is stopped; None when it is not."""

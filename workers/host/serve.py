@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from workers.host import motion, protocol, stop
+from workers.host import live, motion, protocol, stop
 from workers.host.guard import SILENCE_SECONDS, Guard, now
 from workers.host.home import RobotHome
 from workers.host.ledger import LedgerDamaged
@@ -48,12 +48,14 @@ class Host:
     silence: float = SILENCE_SECONDS
     pulse: Pulse = field(default_factory=Pulse)
     guard: Guard = field(init=False)
+    _under_way: "dict[str, Any]" = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Listen for stops from now on."""
         self.guard = Guard(self.home.latch, self.silence)
         facts = {"pid": os.getpid(), "rest": self.machine.rest.stop}
         self._stop_listening = stop.listen(self.home, self.guard, self.pulse, lambda: facts)
+        live.publish(self.home.live, self.pulse, lambda: self._under_way)
         threading.Thread(
             target=motion.watch_over,
             args=(self.guard, self.pulse, self.machine, self._give_up),
@@ -114,9 +116,13 @@ class Host:
 
     def _run(self, trial: str, x: "tuple[float, ...]", seconds: float) -> "dict[str, Any]":
         """Move the robot once; the ledger knows it before anything moves, and what became of it."""
-        found = self._plan_of(x)["objection"] or self._not_yet(trial)
+        plan = self._plan_of(x)
+        found = plan["objection"] or self._not_yet(trial)
         if found:
             return {"say": "refused", "trial": trial, "reason": found}
+        channels = self.machine.channels
+        names, units = [each.name for each in channels], [each.unit for each in channels]
+        self._under_way = {"trial": trial, "steps": plan["steps"], "names": names, "units": units}
         self.machine.folder = folder = make_folder(self.home.trials, trial)
         ledger = self.home.ledger
         self.guard.deadline = now() + min(seconds, self.limits.duration)

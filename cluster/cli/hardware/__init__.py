@@ -3,6 +3,7 @@
 import typer
 
 from cluster.cli.hardware.carry_out import start, status
+from cluster.cli.hardware.console import console, token
 from cluster.cli.hardware.decide import adopt, amend, approve, reject, resolve, withdraw
 from cluster.cli.hardware.record import attach, export, report
 from cluster.cli.hardware.robot import clear, robot, stop
@@ -15,6 +16,6 @@ app = typer.Typer(
 
 for _command in (
     start, status, stop, clear, robot, approve, withdraw, reject, resolve, amend, adopt,
-    attach, report, export,
+    attach, report, export, console, token,
 ):  # fmt: skip
     app.command()(_command)

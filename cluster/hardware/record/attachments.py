@@ -16,6 +16,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from cluster.errors import UsageError, UserError
+from cluster.files import turn_in
 from workers.host import durable
 from workers.host.ledger import Ledger, LedgerDamaged
 
@@ -100,20 +101,26 @@ def attach(folder: Path, trial: int, path: Path, who: str, note: str) -> Attachm
     if not path.is_file():
         raise UsageError(f"there is no file {path} to attach: name one")
     try:
-        listed = attachments(folder)  # a damaged list takes no more, and no copy is made
-        digest, size, unfinished = _copy(path, folder / FOLDER)
-        made = Attachment(trial, path.name, digest, size, who, note, "")
-        known = [each for each in listed if (each.trial, each.sha256) == (trial, digest)]
-        unfinished.replace(folder / made.file)
-        durable.sync_folder(folder / FOLDER)
-        if known:
-            return known[0]
-        facts = {name: getattr(made, name) for name in Attachment.__dataclass_fields__ if name != "at"}
-        entry = Ledger(folder / LIST).append(ATTACHED, facts)
+        with turn_in(folder / FOLDER):
+            return _keep(folder, trial, path, who, note)
     except LedgerDamaged as error:
         raise UserError(f"the list of attachments is damaged: {error}") from error
     except OSError as error:
         raise UserError(f"cannot attach {path}: {error.strerror or error}: {error.filename or ''}") from error
+
+
+def _keep(folder: Path, trial: int, path: Path, who: str, note: str) -> Attachment:
+    """Keep it, unless it is there; nobody else keeps anything meanwhile."""
+    listed = attachments(folder)  # a damaged list takes no more, and no copy is made
+    digest, size, unfinished = _copy(path, folder / FOLDER)
+    made = Attachment(trial, path.name, digest, size, who, note, "")
+    known = [each for each in listed if (each.trial, each.sha256) == (trial, digest)]
+    unfinished.replace(folder / made.file)
+    durable.sync_folder(folder / FOLDER)
+    if known:
+        return known[0]
+    facts = {name: getattr(made, name) for name in Attachment.__dataclass_fields__ if name != "at"}
+    entry = Ledger(folder / LIST).append(ATTACHED, facts)
     return Attachment(**{**facts, "at": entry.at})
 
 
@@ -159,7 +166,6 @@ def damage(folder: Path) -> Iterator[str]:
 
 def _copy(path: Path, into: Path) -> tuple[str, int, Path]:
     """A copy of a file, durable and not yet under its name, with its SHA-256 and its size."""
-    into.mkdir(exist_ok=True)
     unfinished = into / f".{uuid4().hex}.unfinished"
     digest, size = hashlib.sha256(), 0
     try:

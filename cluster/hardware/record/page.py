@@ -51,7 +51,7 @@ def page(
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"number": _number, "when": _when}
+    environment.filters |= {"number": number, "when": when}
     files: dict[int, list[Attachment]] = {}
     for each in attached:
         files.setdefault(each.trial, []).append(each)
@@ -64,8 +64,8 @@ def page(
         files=files,
         measured=len(measured),
         best=max(measured, key=lambda row: row["f"], default=None),
-        figure=_figure(measured) if measured else "",
-        events=[(event, _facts_for_people(event)) for event in events],
+        figure=b64encode(progress(measured)).decode() if measured else "",
+        events=[(event, told(event)) for event in events],
     )
 
 
@@ -76,21 +76,21 @@ def _is_stand_in(robot: str) -> bool:
         return False
 
 
-def _facts_for_people(event: Event) -> list[tuple[str, str]]:
-    """What a person wants to read of an event's body."""
+def told(event: Event) -> list[tuple[str, str]]:
+    """What a person wants to read of an event's body, by name."""
     body = json.loads(event.body)
-    return [(name, _number(body[name])) for name in _TOLD if body.get(name) not in (None, "")]
+    return [(name, number(body[name])) for name in _TOLD if body.get(name) not in (None, "")]
 
 
-def _figure(measured: Sequence[Mapping[str, Any]]) -> str:
-    """The objectives of the trials, and their badness beside what was expected of it, as SVG in base64."""
+def progress(measured: Sequence[Mapping[str, Any]]) -> bytes:
+    """Draw the objectives of measured trials, and their badness beside what was expected of it, as SVG."""
     figure = Figure(figsize=(9, 3), layout="constrained")
     left, right = figure.subplots(1, 2)
     _draw_objectives(left, measured)
     _draw_badness(right, measured)
     content = io.BytesIO()
     figure.savefig(content, format="svg", metadata={"Date": None})
-    return b64encode(content.getvalue()).decode()
+    return content.getvalue()
 
 
 def _draw_objectives(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
@@ -119,11 +119,13 @@ def _draw_badness(axes: Axes, measured: Sequence[Mapping[str, Any]]) -> None:
         axes.text(0.5, 0.5, "nothing was predicted", ha="center", color="#666")
 
 
-def _number(value: Any) -> str:
+def number(value: Any) -> str:
+    """A value for people; "" for none."""
     if value is None:
         return ""
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
-def _when(at: str | None) -> str:
+def when(at: str | None) -> str:
+    """A moment for people; "" for none."""
     return "" if at is None else at.partition(".")[0].replace("T", " ")

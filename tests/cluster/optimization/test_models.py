@@ -64,7 +64,7 @@ def test_a_model_that_several_runs_share_is_loaded_once(folder):
 
 def plan_reader(folder, channels, setup="franka"):
     config = ModelConfig(48, 3, 40, channels=(8,), decoder_hidden=(8,), rank=2, prior_hidden=(8,))
-    model = SvaeDc(replace(config, prior="plan", plan_channels=channels))
+    model = SvaeDc(replace(config, prior="plan", prior_hidden=(8, 8, 8), plan_channels=channels))
     checkpoint.save(folder / "model.pt", model, {"setup": setup, "stride": 5})
 
 

@@ -56,7 +56,7 @@ def test_a_model_that_reads_plans_answers_without_the_code_of_its_robot(setup, t
     torch.manual_seed(0)
     channels = len(robot.controller.planned)
     config = ModelConfig(48, 3, 40, channels=(8,), decoder_hidden=(8,), rank=2, prior_hidden=(8,))
-    model = SvaeDc(replace(config, prior="plan", plan_channels=channels)).eval()
+    model = SvaeDc(replace(config, prior="plan", prior_hidden=(8, 8, 8), plan_channels=channels)).eval()
     checkpoint.save(tmp_path / "model.pt", model, {"setup": setup})
     let_read_plans(model, setup)
     (tmp_path / "saved").mkdir()

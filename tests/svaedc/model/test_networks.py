@@ -42,9 +42,13 @@ def plans(x: torch.Tensor) -> torch.Tensor:
     return torch.stack([x[:, :1] * times, torch.sin(6 * times * x[:, 1:2])], dim=1)
 
 
+def reading(config):
+    return replace(config, prior="plan", prior_hidden=(4, 5, 6, 7), plan_channels=2, plan_steps=7)
+
+
 def test_the_prior_that_reads_plans_tells_controllers_apart_by_them(small_config):
     torch.manual_seed(0)
-    network = PRIORS["plan"](replace(small_config, prior="plan", plan_channels=2, plan_steps=7))
+    network = PRIORS["plan"](reading(small_config))
     x = torch.rand(4, small_config.controller_dim).requires_grad_()
     with pytest.raises(RuntimeError, match="set plan_of"):
         network(x)
@@ -59,13 +63,15 @@ def test_the_prior_that_reads_plans_tells_controllers_apart_by_them(small_config
 
 def test_a_prior_that_reads_plans_needs_some(small_config):
     with pytest.raises(ValueError, match=r"offers its plan, got one of 0 channels.*choose the prior `mlp`"):
-        replace(small_config, prior="plan")
+        replace(reading(small_config), plan_channels=0)
+    with pytest.raises(ValueError, match=r"at least 3 hidden sizes .* got \(8, 8\)"):
+        replace(reading(small_config), prior_hidden=(8, 8))
 
 
 @pytest.mark.parametrize("kind", sorted(PRIORS))
 def test_scales_of_latents_end_at_their_bounds_however_far_the_controller(small_config, kind):
     torch.manual_seed(0)
-    network = PRIORS[kind](replace(small_config, prior=kind, plan_channels=2, plan_steps=7))
+    network = PRIORS[kind](reading(small_config) if kind == "plan" else replace(small_config, prior=kind))
     network.plan_of = plans
     p = network(1e6 * torch.randn(50, small_config.controller_dim))
     bounds = small_config.latent_scale

@@ -1,5 +1,7 @@
 """Changes of a preset, one word each."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -7,12 +9,13 @@ from svaedc.model.svae_dc import SvaeDc
 from svaedc.training.presets import LATENT_SIZES, PRESETS, VARIATIONS, Sizes, preset, vary
 
 SIZES = Sizes(controller_dim=6, observation_dim=5, time_steps=60, plan_channels=4)
+UNPLANNED = replace(SIZES, plan_channels=0)
 CHANGES = {
     "model": "svae",
     "latent": "5x6",
     "distribution": "gaussian",
     "head": "dense",
-    "prior": "plan",
+    "prior": "mlp",
     "weighting": "balanced",
     "kl_weight": 5.0,
     "learning_rate": 3e-4,
@@ -41,7 +44,7 @@ def test_a_change_changes_the_preset_and_the_word_preset_nothing(name, change):
 @pytest.mark.parametrize("model", ["svae-dc", "svae"])
 def test_every_latent_size_of_the_paper_gives_a_finite_bound_with_and_without_psi(name, latent, model):
     torch.manual_seed(0)
-    config = vary(preset(name)(SIZES), {"latent": latent, "model": model}).model
+    config = vary(preset(name)(UNPLANNED), {"latent": latent, "model": model}).model
     steps, dimensions = map(int, latent.split("x"))
     bound = SvaeDc(config).elbo(torch.rand(1, 6), torch.rand(1, 5, 60), torch.zeros(1, 60), torch.rand(1))
     assert torch.isfinite(bound).all()
@@ -70,3 +73,10 @@ def test_changes_count_the_same_in_whatever_order_they_are_written():
     assert vary(made, dict(reversed(CHANGES.items()))) == forwards
     assert vary(made, {"kl_weight": 3.0, "weighting": "balanced"}).training.weighting.kl == 3.0
     assert forwards.training.weighting.y == 100.0
+
+
+def test_the_compact_preset_reads_plans_where_there_are_some():
+    reader, other = (preset("compact")(sizes) for sizes in (SIZES, UNPLANNED))
+    assert (reader.model.prior, other.model.prior) == ("plan", "mlp")
+    assert reader.training.joint.dropout > 0
+    assert vary(reader, {"prior": "mlp"}).training == other.training
