@@ -43,6 +43,7 @@ class Panel:
         candidates: setups in which candidates are simulated before the trials; none where each run draws a
             pool of its own.
         models: of as many training seeds, with which the runs take turns.
+        pool: controllers that each run chooses among, drawn anew for every run; 0 for the setting's.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Panel:
     latent: str = NINE
     candidates: tuple[str, ...] = ()
     models: int = 1
+    pool: int = 0
 
     def __post_init__(self) -> None:
         """Refuse methods that lack their model or their candidates."""

@@ -175,7 +175,9 @@ def _simulate(
 def _compare(
     reproduction: Reproduction, panel: Panel, settings: Settings, session: Session, tracker: Tracker
 ) -> Comparison:
-    recipe = reproduction.recipe
+    recipe, ours = reproduction.recipe, settings.compare
+    if panel.pool:
+        ours = ours.model_copy(update={"pool_size": panel.pool})
     plan = plan_comparison(
         setup=setups.load(panel.setup),
         grid=Grid(panel.methods, seed=0, runs=reproduction.runs),
@@ -183,7 +185,7 @@ def _compare(
         gap=panel.gap,
         models=reproduction.models_of(panel),
         folder=reproduction.comparison(panel),
-        settings=settings.compare,
+        settings=ours,
         caption=f"{recipe.figure}, {panel.name}: {panel.title}" if recipe.figure else "",
         candidates=reproduction.candidates(panel) if panel.candidates else None,
     )

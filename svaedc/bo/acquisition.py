@@ -220,6 +220,20 @@ def ucb(mu: Float[Tensor, "*n"], sigma: Float[Tensor, "*n"], best: float) -> Flo
     return mu + BETA**0.5 * sigma
 
 
+def mean(mu: Float[Tensor, "*n"], sigma: Float[Tensor, "*n"], best: float) -> Float[Tensor, "*n"]:  # noqa: ARG001
+    r"""\mu(x): what is expected, without a bonus for what is uncertain.
+
+    Args:
+        mu: Mean of f, [*n].
+        sigma: Not used.
+        best: Not used.
+
+    Returns:
+        Values, [*n], in the unit of f.
+    """
+    return mu
+
+
 def log_ei(mu: Float[Tensor, "*n"], sigma: Float[Tensor, "*n"], best: float) -> Float[Tensor, "*n"]:
     r"""LogEI(x) = log E[max(f(x) - best, 0)] = log \sigma + log h(z) with z = (\mu - best) / \sigma.
 

@@ -140,6 +140,30 @@ def fit(
     return GaussianProcess(process, event)
 
 
+def conditioned(
+    kernel: Callable[[], Kernel],
+    phi: Float[Tensor, "n k"],
+    f: Float[Tensor, " n"],
+    mean: Callable[[], Mean],
+    noise: float,
+) -> GaussianProcess:
+    """The process with hyper-parameters that are given, conditioned on all trials.
+
+    Args:
+        kernel: Makes the kernel.
+        phi: Features of the trials, float64.
+        f: Objectives, scaled to [0, 1].
+        mean: Makes the mean.
+        noise: Its variance.
+
+    Returns:
+        The process.
+    """
+    process = _process(kernel(), mean(), phi, f)
+    process.likelihood.noise = noise
+    return GaussianProcess(process)
+
+
 def _process(kernel: Kernel, mean: Mean, phi: Tensor, f: Tensor) -> SingleTaskGP:
     likelihood = GaussianLikelihood(noise_constraint=GreaterThan(LEAST_NOISE, initial_value=1e-3))
     # BoTorch warns that features are outside the unit cube and objectives not standardised: both are meant.

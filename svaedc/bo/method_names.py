@@ -42,6 +42,8 @@ PRIORS: Final = {
     "ensemble-se": "the robot as one more of the simulated worlds, what no world shows on the controllers",
     "ensemble-svae": "the same on latent paths",
     "ensemble-svae-dc": "the same on compressed latent paths",
+    "residual-svae": "the simulated objective, corrected by trials of candidates that do nearly the same",
+    "residual-svae-dc": "the same on compressed latent paths",
 }
 """These need candidates that were simulated."""
 VARIANTS: Final = {
@@ -53,11 +55,14 @@ SUMMARIES: Final[Mapping[str, str]] = dict(
 )
 """These are the methods of the comparison; most take a search and an acquisition behind their name."""
 SEARCHES: Final = ("pool", "acqf")
-ACQUISITIONS: Final = ("ucb", "ei")
+ACQUISITIONS: Final = ("ucb", "ei", "mean")
 _OURS, _PRACTITIONERS = ("pool", "ucb"), ("acqf", "ei")
-_DEFAULTS: Final = {name: _OURS for name in CONTROLLERS | LATENT | PRIORS} | {
-    name: _PRACTITIONERS for name in ("botorch", "saasbo", "turbo")
-}
+_NEARBY: Final = ("pool", "mean")
+_DEFAULTS: Final = (
+    dict.fromkeys(CONTROLLERS | LATENT | PRIORS, _OURS)
+    | dict.fromkeys(("botorch", "saasbo", "turbo"), _PRACTITIONERS)
+    | dict.fromkeys(("residual-svae", "residual-svae-dc"), _NEARBY)
+)
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ def ships(name: str) -> bool:
 
 
 def names() -> tuple[str, ...]:
-    """The methods of the comparison. Most also take `-pool` or `-acqf`, then `-ucb` or `-ei`, behind them."""
+    """The methods of the comparison. Most also take `-pool` or `-acqf`, then `-ucb`, `-ei` or `-mean`."""
     return tuple(SUMMARIES)
 
 

@@ -14,11 +14,12 @@ from svaedc.bo.acquisition import (
     OverPool,
     Search,
     log_ei,
+    mean,
     ucb,
 )
 from svaedc.bo.candidates import Candidates, Problem, as_they_are
 from svaedc.bo.method_names import MethodName, names, needs_candidates, needs_model
-from svaedc.bo.simulated import prior
+from svaedc.bo.simulated import prior, residual
 from svaedc.bo.simulated.outcomes import spread
 from svaedc.bo.strategies import (
     BayesianOptimization,
@@ -64,11 +65,11 @@ SIMULATED_SURROGATES: Final[dict[str, Callable[[Problem], Surrogate]]] = {
         ("svae", prior.on_paths),
         ("svae-dc", prior.on_compressed_paths),
     )
-}
+} | {"residual-svae": residual.on_paths, "residual-svae-dc": residual.on_compressed_paths}
 """These methods need candidates that were simulated."""
 
 _SEARCHES: Final[dict[str, Search]] = {"pool": OverPool(), "acqf": ByGradient()}
-_ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei}
+_ACQUISITIONS: Final[dict[str, Acquisition]] = {"ucb": ucb, "ei": log_ei, "mean": mean}
 _UNLEARNT: Final[dict[str, Callable[[Problem], Method]]] = {
     "random": lambda problem: UniformSearch(problem.dimensions),
     "screened-random": lambda problem: PoolSearch(as_they_are(problem.least_bad(LEAST_BAD))),

@@ -107,20 +107,24 @@ class ModelConfig:
             raise ValueError(f"psi_dim must be at least 1, or 0 for the SVAE, got {self.psi_dim}")
         for name in ("channels", "decoder_hidden", "prior_hidden", "badness_hidden"):
             _require_positive(name, getattr(self, name))
-        if self.prior == "plan" and (self.plan_channels < 1 or self.plan_steps < 1):
-            raise ValueError(
-                "the prior `plan` needs a controller that offers its plan, got one of "
-                f"{self.plan_channels} channels and {self.plan_steps} steps: choose the prior `mlp`"
-            )
-        if self.prior == "plan" and len(self.prior_hidden) < 3:
-            raise ValueError(
-                "the prior `plan` needs at least 3 hidden sizes (filters, recurrent units, hidden units), "
-                f"got {self.prior_hidden}"
-            )
+        if self.prior == "plan":
+            self._require_plan()
         if encoded_length(self.time_steps, len(self.channels)) < 1:
             raise ValueError(
                 f"time_steps must be long enough for {len(self.channels)} convolutions of width {KERNEL} and "
                 f"stride {STRIDE}, got {self.time_steps}; lower the training stride"
+            )
+
+    def _require_plan(self) -> None:
+        if self.plan_channels < 1 or self.plan_steps < 1:
+            raise ValueError(
+                "the prior `plan` needs a controller that offers its plan, got one of "
+                f"{self.plan_channels} channels and {self.plan_steps} steps: choose the prior `mlp`"
+            )
+        if len(self.prior_hidden) < 3:
+            raise ValueError(
+                "the prior `plan` needs at least 3 hidden sizes (filters, recurrent units, hidden units), "
+                f"got {self.prior_hidden}"
             )
 
     @property

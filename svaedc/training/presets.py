@@ -141,6 +141,8 @@ _PRIOR_HIDDEN: Final = {
 }
 _REGULARISED: Final = {"mlp": (0.0, 0.0), "deconv": (0.0, 0.0), "plan": (0.1, 1e-2)}
 """Dropout and weight decay: what reads plans can learn them by heart."""
+_Y_WEIGHTS: Final = {"mlp": 1.0, "deconv": 1.0, "plan": 30.0}
+"""Of log p(y|psi): what a plan tells of badness drowns in the elements of xi otherwise."""
 
 
 def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
@@ -203,8 +205,9 @@ def _prior(preset: Preset, value: str) -> Preset:
     hidden = _chosen("prior", value, _PRIOR_HIDDEN)
     dropout, decay = _REGULARISED[value]
     joint = replace(preset.training.joint, dropout=dropout, weight_decay=decay)
+    weighting = replace(preset.training.weighting, y=_Y_WEIGHTS[value])
     model = replace(preset.model, prior=value, prior_hidden=hidden)
-    return Preset(model, replace(preset.training, joint=joint))
+    return Preset(model, replace(preset.training, joint=joint, weighting=weighting))
 
 
 def _weighting(preset: Preset, value: str) -> Preset:

@@ -163,6 +163,17 @@ def _on_latents(embedding: Embedding, prior: Regressors, kernel: KernelOf, probl
 
 def _surrogate(compared: Candidates, prior: Regressors, kernel: KernelOf, problem: Problem) -> Surrogate:
     dimensions = compared.phi.shape[1]
+    features, worlds = worlds_behind(dimensions)
+    process = partial(
+        fit,
+        lambda: Embedded(kernel(dimensions), features) + LinearKernel(worlds, prior),
+        mean=lambda: SimulatedMean(worlds),
+    )
+    return Surrogate(with_simulations(compared, problem), process, problem.objective_limits)
+
+
+def worlds_behind(dimensions: int) -> tuple[Callable[[Tensor], Tensor], WorldsOf]:
+    """Two functions of rows of `with_simulations`: to their features, and to what simulation showed."""
 
     def features(rows: Tensor) -> Tensor:
         return rows[..., :dimensions]
@@ -170,16 +181,19 @@ def _surrogate(compared: Candidates, prior: Regressors, kernel: KernelOf, proble
     def worlds(rows: Tensor) -> Worlds:
         return Worlds(*rows[..., dimensions:].chunk(2, dim=-1))
 
-    process = partial(
-        fit,
-        lambda: Embedded(kernel(dimensions), features) + LinearKernel(worlds, prior),
-        mean=lambda: SimulatedMean(worlds),
-    )
-    return Surrogate(_with_simulations(compared, problem), process, problem.objective_limits)
+    return features, worlds
 
 
-def _with_simulations(candidates: Candidates, problem: Problem) -> Candidates:
-    """The same pool; its features have the scaled objectives and the badness in all worlds behind them."""
+def with_simulations(candidates: Candidates, problem: Problem) -> Candidates:
+    """Put the scaled objectives and the badness in all worlds behind the features of a pool.
+
+    Args:
+        candidates: The pool.
+        problem: With simulated outcomes of all its candidates.
+
+    Returns:
+        The same pool, with rows of features [k + 2 e].
+    """
     simulated = problem.known_outcomes()
 
     def embed(x: Tensor) -> Tensor:

@@ -126,6 +126,7 @@ def test_pool_of_identical_controllers_is_no_division_by_zero():
 def test_model_is_needed_exactly_where_latents_are_used():
     assert [name for name in methods.names() if methods.needs_model(name)] == [
         *("bbk-kl", "ensemble-svae", "ensemble-svae-dc", "lkl", "prior-svae", "prior-svae-dc"),
+        *("residual-svae", "residual-svae-dc"),
         *("screened-random", "screened-svae", "svae", "svae-dc", "svae-dc-matern"),
         *("svae-dc-online", "svae-dc-sigmoid", "svae-dc-whitened", "svae-matern"),
     ]
