@@ -44,13 +44,22 @@ def replace(path: Path, content: bytes, mode: int = 0o666) -> None:
     Raises:
         OSError: the disk is full or broken.
     """
-    with _written_beside(path, content, mode) as unfinished:
+    unfinished = _beside(path)
+    try:
+        with open(unfinished, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
         unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
     sync_folder(path.parent)
 
 
 def create(path: Path, content: bytes) -> bool:
-    """Write a file whole, unless there is one; of several who try at once, one succeeds.
+    """Write a file, unless there is one; of several who try at once, one succeeds.
+
+    Others see it at once, before it is on disk: a slow disk delays nobody who only asks whether it is there.
 
     Args:
         path: of the file.
@@ -62,29 +71,26 @@ def create(path: Path, content: bytes) -> bool:
     Raises:
         OSError: the disk is full or broken.
     """
-    with _written_beside(path, content) as unfinished:
-        try:
-            os.link(unfinished, path)
-        except FileExistsError:
-            return False
-        except OSError:  # a file system without hard links
-            unfinished.replace(path)
+    unfinished = _beside(path)
+    try:
+        with unfinished.open("wb") as file:
+            file.write(content)
+            file.flush()
+            try:
+                os.link(unfinished, path)
+            except FileExistsError:
+                return False
+            except OSError:  # a file system without hard links
+                unfinished.replace(path)
+            os.fsync(file.fileno())
+    finally:
+        unfinished.unlink(missing_ok=True)
     sync_folder(path.parent)
     return True
 
 
-@contextmanager
-def _written_beside(path: Path, content: bytes, mode: int = 0o666) -> Iterator[Path]:
-    """The bytes on disk under another name, which is gone in the end."""
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}.unfinished")
-    try:
-        with open(unfinished, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        yield unfinished
-    finally:
-        unfinished.unlink(missing_ok=True)
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}.unfinished")
 
 
 def sync_folder(folder: Path) -> None:
