@@ -128,18 +128,28 @@ def serve(folder: Path, place: Place, say: Callable[[str], None]) -> None:
         pages = Pages(desk, Stopper(place.stop_url, key))
         console = Console(desk, tokens, pages, place.scheme == "https", Sessions(), closing)
         guarded = Guards(application(console), place.hosts, place.scheme, place.stop_url.rpartition("/")[0])
-        say(f"open {place.url}  (Ctrl-C ends it)")
-        if first:
-            say(f"your token, shown this once: {first}")
-        _Server(_config(guarded, place), closing).run(sockets=[listening])
+
+        def announce() -> None:
+            say(f"open {place.url}  (Ctrl-C ends it)")
+            if first:
+                say(f"your token, shown this once: {first}")
+
+        _Server(_config(guarded, place), announce, closing).run(sockets=[listening])
 
 
 class _Server(uvicorn.Server):
-    """It lets go of pages that listen before it waits for them."""
+    """It says when it answers, and lets go of pages that listen before it waits for them."""
 
-    def __init__(self, config: uvicorn.Config, closing: threading.Event) -> None:
+    def __init__(
+        self, config: uvicorn.Config, announce: Callable[[], None], closing: threading.Event
+    ) -> None:
         super().__init__(config)
-        self._closing = closing
+        self._announce, self._closing = announce, closing
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to answer."""
+        await super().startup(sockets)
+        self._announce()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Begin to end."""
