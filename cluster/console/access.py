@@ -132,7 +132,7 @@ class AccessTokens:
                 found = Person(name, each.role)
         return found
 
-    def named(self, person: Person) -> bool:
+    def knows(self, person: Person) -> bool:
         """Whether a person still has the token of that role."""
         token = self.all().get(person.name)
         return token is not None and token.role is person.role

@@ -13,7 +13,7 @@ from fastapi import Depends, HTTPException, Request
 from cluster.console.access import AccessTokens, Person, Role
 from cluster.console.desk import Desk
 from cluster.console.pages import Pages
-from cluster.console.sessions import COOKIE, Session, Sessions
+from cluster.console.sessions import COOKIE, BrowserSession, Sessions
 from cluster.errors import UsageError
 
 
@@ -44,7 +44,7 @@ def console_of(request: Request) -> Console:
     return found
 
 
-def visitor(request: Request) -> Session:
+def visitor(request: Request) -> BrowserSession:
     """Who asks: the browser of a session, or a program with a token.
 
     Raises:
@@ -56,9 +56,9 @@ def visitor(request: Request) -> Session:
         person = console.tokens.person(token.strip())
         if person is None:
             raise HTTPException(401, "this token is not known here")
-        return Session(person, "", math.inf)
+        return BrowserSession(person, "", math.inf)
     session = console.sessions.find(request.cookies.get(COOKIE, ""))
-    if session is None or not console.tokens.named(session.person):
+    if session is None or not console.tokens.knows(session.person):
         raise HTTPException(401, "enter first")
     return session
 
@@ -108,7 +108,7 @@ def operator_with(request: Request, key: str) -> Person:
     return session.person
 
 
-def require_own_form(session: Session, key: str) -> None:
+def require_own_form(session: BrowserSession, key: str) -> None:
     """Refuse a form that another site made.
 
     Args:
@@ -160,6 +160,6 @@ def wants_json(request: Request) -> bool:
 
 
 Ours = Annotated[Console, Depends(console_of)]
-Visitor = Annotated[Session, Depends(visitor)]
+Visitor = Annotated[BrowserSession, Depends(visitor)]
 Form = Annotated[Mapping[str, str], Depends(fields)]
 Decider = Annotated[Person, Depends(decider)]

@@ -34,21 +34,21 @@ def approve(console: Ours, request: Request, number: int, who: Decider, form: Fo
     """Let a checked trial onto the robot."""
     minutes = number_in(form, "minutes") or operator.VALID_MINUTES
     operator.approve(console.desk.folder, number, who.name, minutes, version_in(form))
-    return _done(request, "/")
+    return _answer(request, "/")
 
 
 @router.post("/withdraw")
 def withdraw(console: Ours, request: Request, number: int, who: Decider, form: Form) -> Response:
     """Take an approval back."""
     operator.withdraw(console.desk.folder, number, who.name, version_in(form))
-    return _done(request, "/")
+    return _answer(request, "/")
 
 
 @router.post("/reject")
 def reject(console: Ours, request: Request, number: int, who: Decider, form: Form) -> Response:
     """Keep a trial off the robot."""
     operator.reject(console.desk.folder, number, who.name, _note(form.get("note", "")), version_in(form))
-    return _done(request, "/")
+    return _answer(request, "/")
 
 
 @router.post("/resolve")
@@ -59,7 +59,7 @@ def resolve(console: Ours, request: Request, number: int, who: Decider, form: Fo
     f, y, again = (number_in(form, name) for name in ("f", "y", "confirm"))
     note, seen = _note(form.get("note", "")), version_in(form)
     operator.resolve(console.desk.folder, number, form.get("outcome", ""), who.name, note, f, y, again, seen)
-    return _done(request, "/")
+    return _answer(request, "/")
 
 
 @router.post("/amend")
@@ -70,7 +70,7 @@ def amend(console: Ours, request: Request, number: int, who: Decider, form: Form
         raise UsageError("an amended trial needs its objective f and its badness y")
     note, seen = _note(form.get("note", "")), version_in(form)
     operator.amend(console.desk.folder, number, who.name, note, f, y, again, seen)
-    return _done(request, f"/trials/{number}")
+    return _answer(request, f"/trials/{number}")
 
 
 @router.post("/attach")
@@ -82,7 +82,7 @@ async def attach(console: Ours, request: Request, number: int) -> Response:
         if file is None or isinstance(file, str):
             raise UsageError("choose a file to attach")
         await asyncio.to_thread(_keep, console.desk.folder, number, file, who.name, note)
-    return _done(request, f"/trials/{number}")
+    return _answer(request, f"/trials/{number}")
 
 
 def harmless_name(name: str) -> str:
@@ -109,5 +109,5 @@ def _note(text: str) -> str:
     return text
 
 
-def _done(request: Request, page: str) -> Response:
+def _answer(request: Request, page: str) -> Response:
     return JSONResponse({"done": True}) if wants_json(request) else RedirectResponse(page, 303)

@@ -55,6 +55,15 @@ class View:
         """When the campaign came to where it stands; "" before its first event."""
         return self.events[-1].at if self.events else ""
 
+    @property
+    def attendance(self) -> str:
+        """Whether anything carries the campaign out, in a sentence."""
+        if not self.holder:
+            return "Nobody has the robot: the start command does not run."
+        if self.holder.startswith(f"the campaign in {self.status.folder} "):
+            return "The start command runs."
+        return f"The robot is held by {self.holder}."
+
     def events_of(self, number: int) -> list[Event]:
         """Every event of a trial, oldest first."""
         return [event for event in self.events if event.trial == number]
@@ -121,14 +130,14 @@ class Desk:
             self.home.latch.path,
             self.home.live,
         )
-        return tuple(_changed(path) for path in files)
+        return tuple(_change_of(path) for path in files)
 
     def clip(self, number: int) -> Path | None:
         """The drawing of a trial's first simulation; None where there is none."""
         paths = (self.folder / PREVIEWS / f"trial-{number:03d}{suffix}" for suffix in CLIPS)
         return next((path for path in paths if path.is_file()), None)
 
-    def attached(self, sha256: str) -> tuple[Path, Attachment] | None:
+    def attachment(self, sha256: str) -> tuple[Path, Attachment] | None:
         """A file of the campaign by its hash, and what is known of it; None where there is none."""
         found = next((each for each in attachments(self.folder) if each.sha256 == sha256), None)
         return (self.folder / found.file, found) if found else None
@@ -142,7 +151,7 @@ class Desk:
         return seen if seen.get("trial") == f"{status.name}-{number:03d}" else {}
 
 
-def _changed(path: Path) -> int:
+def _change_of(path: Path) -> int:
     try:
         return os.stat(path).st_mtime_ns  # noqa: PTH116 - of many files, many times
     except OSError:

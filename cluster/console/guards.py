@@ -54,7 +54,7 @@ class Guards:
 
         async def guarded_send(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message = {**message, "headers": [*_cached(message["headers"]), *self._headers]}
+                message = {**message, "headers": [*_headers_of(message["headers"]), *self._headers]}
             await send(message)
 
         await self._app(scope, _counting(receive, _limit(scope["path"])), guarded_send)
@@ -103,7 +103,7 @@ def _counting(receive: Receive, limit: int) -> Receive:
     return counted
 
 
-def _cached(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
+def _headers_of(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
     """Nothing is kept by the browser, but for what says otherwise."""
     found = list(headers)
     if not any(name.lower() == b"cache-control" for name, _ in found):

@@ -13,7 +13,7 @@ from fastapi.responses import FileResponse, HTMLResponse, Response, StreamingRes
 
 from cluster.console.asking import Console, Ours, Visitor, visitor
 from cluster.console.desk import CLIPS
-from cluster.console.sessions import Session
+from cluster.console.sessions import BrowserSession
 from cluster.errors import UserError
 from cluster.hardware.record.export import export
 from cluster.hardware.record.page import progress
@@ -78,7 +78,7 @@ def figure(console: Ours) -> Response:
 @router.get("/attachments/{sha256}")
 def attachment(console: Ours, sha256: str) -> Response:
     """A file of a trial, to be kept and not to be shown: it may hold anything."""
-    found = console.desk.attached(sha256)
+    found = console.desk.attachment(sha256)
     if found is None:
         raise HTTPException(404, "there is no such file")
     path, known = found
@@ -86,7 +86,7 @@ def attachment(console: Ours, sha256: str) -> Response:
 
 
 @router.get("/export/{form}")
-def exported(console: Ours, form: str) -> Response:
+def export_as(console: Ours, form: str) -> Response:
     """The campaign for other programs."""
     if form not in KINDS:
         raise HTTPException(404, f"there are {', '.join(KINDS)}")
@@ -98,12 +98,12 @@ def exported(console: Ours, form: str) -> Response:
     return Response(content, media_type=KINDS[form], headers=headers)
 
 
-async def _pulses(console: Console, request: Request, session: Session) -> AsyncIterator[str]:
+async def _pulses(console: Console, request: Request, session: BrowserSession) -> AsyncIterator[str]:
     """An event whenever something changed, and every few seconds, so that silence means something."""
     seen: tuple[int, ...] = ()
     told, clock = -math.inf, asyncio.get_running_loop().time
     while not (console.closing.is_set() or await request.is_disconnected()):
-        if not await asyncio.to_thread(console.tokens.named, session.person):
+        if not await asyncio.to_thread(console.tokens.knows, session.person):
             return
         signature = await asyncio.to_thread(console.desk.signature)
         if signature != seen or clock() - told > TELL_SECONDS:

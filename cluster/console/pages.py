@@ -8,12 +8,12 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cluster.console.desk import Desk, View
-from cluster.console.sessions import Session
-from cluster.hardware.operator import OUTCOMES, VALID_MINUTES
-from cluster.hardware.record.page import number, told, when
+from cluster.console.sessions import BrowserSession
+from cluster.hardware.operator import VALID_MINUTES
+from cluster.hardware.record.page import facts_told, number, when
+from cluster.hardware.record.resolution import OUTCOMES, objective_limits
 from cluster.hardware.states import State
 from cluster.hardware.status import Phase
-from workers import setups
 
 STATIC: Final = {"console.css": "text/css", "console.js": "text/javascript", "icon.svg": "image/svg+xml"}
 
@@ -58,9 +58,9 @@ class Pages:
             trim_blocks=True,
             lstrip_blocks=True,
         )
-        self._environment.filters |= {"number": number, "when": when, "told": told}
+        self._environment.filters |= {"number": number, "when": when, "told": facts_told}
 
-    def now(self, session: Session, view: View) -> str:
+    def now(self, session: BrowserSession, view: View) -> str:
         """Show what the campaign needs now, and the forms that give it that.
 
         Args:
@@ -80,11 +80,11 @@ class Pages:
             motion=view.status.motion,
             clip=self._clip_of(trial.number) if trial else "",
             outcomes=OUTCOMES,
-            limits=_objective_limits(view),
+            limits=objective_limits(view.status.identity.setup),
             minutes=VALID_MINUTES,
         )
 
-    def history(self, session: Session, view: View) -> str:
+    def history(self, session: BrowserSession, view: View) -> str:
         """Show every trial, the best so far, and predictions beside measurements.
 
         Args:
@@ -98,7 +98,7 @@ class Pages:
         best = max(measured, key=lambda row: row["f"], default=None)
         return self._page("history", session, view, rows=view.rows, measured=measured, best=best)
 
-    def trial(self, session: Session, view: View, number: int) -> str:
+    def trial(self, session: BrowserSession, view: View, number: int) -> str:
         """Show all that is known of one trial, and the forms that correct and complete it.
 
         Args:
@@ -118,14 +118,14 @@ class Pages:
             events=view.events_of(number),
             files=view.files_of(number),
             clip=self._clip_of(number),
-            limits=_objective_limits(view),
+            limits=objective_limits(view.status.identity.setup),
         )
 
     def enter(self, message: str) -> str:
         """Where a token is asked for."""
         return self._environment.get_template("enter.html.j2").render(message=message)
 
-    def message(self, title: str, detail: str, back: str, session: Session | None) -> str:
+    def message(self, title: str, detail: str, back: str, session: BrowserSession | None) -> str:
         """Why something was not done.
 
         Args:
@@ -141,7 +141,7 @@ class Pages:
         template = self._environment.get_template("message.html.j2")
         return template.render(title=title, detail=detail, back=back, stopper=self._stopper, key=key)
 
-    def _page(self, name: str, session: Session, view: View, **content: Any) -> str:
+    def _page(self, name: str, session: BrowserSession, view: View, **content: Any) -> str:
         template = self._environment.get_template(f"{name}.html.j2")
         return template.render(
             page=name,
@@ -168,11 +168,3 @@ def static(name: str) -> bytes:
     if name not in STATIC:
         raise KeyError(name)
     return resources.files("cluster.console").joinpath("static", name).read_bytes()
-
-
-def _objective_limits(view: View) -> tuple[float, float] | None:
-    """What objectives are possible; None where the setup's module is not here."""
-    try:
-        return setups.load(view.status.identity.setup).objective_limits
-    except LookupError:
-        return None

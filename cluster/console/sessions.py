@@ -17,7 +17,7 @@ _TRIES_SECONDS: Final = 60.0
 
 
 @dataclass(frozen=True)
-class Session:
+class BrowserSession:
     """One browser that somebody entered with.
 
     Attributes:
@@ -44,7 +44,7 @@ class Sessions:
     """
 
     failures: deque[float] = field(default_factory=lambda: deque(maxlen=_TRIES))
-    _known: dict[str, Session] = field(default_factory=dict)
+    _known: dict[str, BrowserSession] = field(default_factory=dict)
 
     def begin(self, person: Person) -> str:
         """Let a browser in; returns the value of its cookie."""
@@ -53,10 +53,10 @@ class Sessions:
         while len(self._known) >= _MOST:
             self._known.pop(next(iter(self._known)))
         name = secrets.token_urlsafe(24)
-        self._known[name] = Session(person, secrets.token_urlsafe(24), now + LIFETIME_SECONDS)
+        self._known[name] = BrowserSession(person, secrets.token_urlsafe(24), now + LIFETIME_SECONDS)
         return name
 
-    def find(self, cookie: str) -> Session | None:
+    def find(self, cookie: str) -> BrowserSession | None:
         """The session of a cookie; None where there is none, or where it is over."""
         found = self._known.get(cookie)
         return found if found and found.until > time.monotonic() else None

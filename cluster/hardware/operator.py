@@ -11,15 +11,14 @@ from cluster.hardware.journal import Journal
 from cluster.hardware.lock import FolderLock, Process
 from cluster.hardware.record import attachments, opening
 from cluster.hardware.record.attachments import Attachment
+from cluster.hardware.record.resolution import require_possible, resolution_of
 from cluster.hardware.robot import residence
 from cluster.hardware.states import State
 from cluster.hardware.status import Status
 from cluster.hardware.status import status as look
-from workers import setups
 from workers.hardware import robots
 from workers.hardware.gate import Gate
 
-OUTCOMES = (State.MEASURED, State.FAILED, State.ABORTED)
 VALID_MINUTES = 60.0
 """An approval holds so long, unless a person says otherwise."""
 
@@ -164,10 +163,10 @@ def resolve(
         IllegalTransition: when the trial is neither unknown nor, for an amendment, measured.
         FolderTaken: when the trial is running at this moment.
     """
-    new, body = _resolution(outcome, note, f, y)
+    new, body = resolution_of(outcome, note, f, y)
     close_abandoned(folder, patience=0.0)
     with opening.to_write(folder) as opened:
-        _require_possible(opened, f, confirmed)
+        require_possible(opened.identity.setup, f, confirmed)
         return campaign.record(opened, _trial_as_seen(opened, trial, seen), new, _require_name(who), body)
 
 
@@ -263,21 +262,6 @@ def _gate(folder: Path, opened: Journal) -> Gate:
     return Gate(home, residence.limits_of(home, simulated=simulated), folder)
 
 
-def _require_possible(opened: Journal, f: float | None, confirmed: float | None) -> None:
-    """Refuse an objective that the setup rules out, unless it is typed twice."""
-    if f is None or confirmed == f:
-        return
-    try:
-        low, high = setups.load(opened.identity.setup).objective_limits
-    except LookupError:  # its module is not here, so nobody knows
-        return
-    if not low <= f <= high:
-        raise UsageError(
-            f"the objective of {opened.identity.setup} must lie in [{low:g}, {high:g}], got {f:g}, and one "
-            f"outside misleads every later suggestion; if it is meant, type it again with --confirm {f:g}"
-        )
-
-
 def _trial_as_seen(opened: Journal, number: int, seen: int | None) -> CampaignTrial:
     """A trial, if it still is what a person saw; that it stays so until the event is the journal's matter."""
     trial = opened.trial(number)
@@ -294,21 +278,3 @@ def _require_name(who: str) -> str:
     if not who.strip():
         raise UsageError("who must name a person, got nothing; give --who NAME")
     return f"operator: {who.strip()}"
-
-
-def _resolution(
-    outcome: str, note: str, f: float | None, y: float | None
-) -> tuple[State, dict[str, str | float | None]]:
-    if outcome not in OUTCOMES:
-        raise UsageError(f"outcome must be one of {', '.join(OUTCOMES)}, got {outcome!r}")
-    if not note.strip():
-        raise UsageError("a resolution needs a note that says what was seen, got nothing; give --note TEXT")
-    if outcome != State.MEASURED:
-        if f is not None or y is not None:
-            raise UsageError(f"f and y belong to the outcome measured, got f {f} and y {y} for {outcome}")
-        return State(outcome), {"note": note}
-    if f is None or not abs(f) < float("inf"):
-        raise UsageError(f"a measured trial needs a finite objective, got {f}; give --f NUMBER")
-    if y is None or not 0.0 <= y <= 1.0:
-        raise UsageError(f"a measured trial needs a badness in [0, 1], got {y}; give --y NUMBER")
-    return State.MEASURED, {"f": f, "y": y, "note": note}

@@ -140,7 +140,7 @@ def fit(
     return GaussianProcess(process, event)
 
 
-def conditioned(
+def condition(
     kernel: Callable[[], Kernel],
     phi: Float[Tensor, "n k"],
     f: Float[Tensor, " n"],

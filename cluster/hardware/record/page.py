@@ -65,7 +65,7 @@ def page(
         measured=len(measured),
         best=max(measured, key=lambda row: row["f"], default=None),
         figure=b64encode(progress(measured)).decode() if measured else "",
-        events=[(event, told(event)) for event in events],
+        events=[(event, facts_told(event)) for event in events],
     )
 
 
@@ -76,7 +76,7 @@ def _is_stand_in(robot: str) -> bool:
         return False
 
 
-def told(event: Event) -> list[tuple[str, str]]:
+def facts_told(event: Event) -> list[tuple[str, str]]:
     """What a person wants to read of an event's body, by name."""
     body = json.loads(event.body)
     return [(name, number(body[name])) for name in _TOLD if body.get(name) not in (None, "")]

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from svaedc.bo.candidates import Problem, by_latents
 from svaedc.bo.features import Embedding, svae, svae_dc
-from svaedc.bo.gp import conditioned
+from svaedc.bo.gp import condition
 from svaedc.bo.kernels import Embedded
 from svaedc.bo.simulated.outcomes import spread
 from svaedc.bo.simulated.prior import WorldsOf, with_simulations, worlds_behind
@@ -81,7 +81,7 @@ def _on_latents(embedding: Embedding, problem: Problem) -> Surrogate:
     compared = by_latents(problem, embedding)
     features, worlds = worlds_behind(compared.phi.shape[1])
     process = partial(
-        conditioned,
+        condition,
         lambda: Embedded(_nearby(), features) + _shift(),
         mean=lambda: CautiousMean(worlds),
         noise=NOISE**2,

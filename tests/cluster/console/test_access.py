@@ -27,7 +27,7 @@ def test_a_token_ends_when_it_is_revoked_or_given_anew(tmp_path):
     first = tokens.issue("Ada", Role.OPERATOR)
     second = tokens.issue("Ada", Role.VIEWER)
     assert tokens.person(first) is None
-    assert not tokens.named(Person("Ada", Role.OPERATOR))
+    assert not tokens.knows(Person("Ada", Role.OPERATOR))
     tokens.revoke("Ada")
     assert tokens.person(second) is None
     with pytest.raises(UsageError, match="nobody called 'Ada' has a token; there are: none"):

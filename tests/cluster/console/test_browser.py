@@ -94,6 +94,7 @@ def test_a_trial_is_approved_withdrawn_and_rejected(chromium, folder, size):
     with serving(folder) as served:
         enter(chromium, served, size)
         wait(chromium, "h1", "Awaits approval")
+        wait(chromium, "main", "Nobody has the robot: the start command does not run.")
         assert_fits(chromium)
         Select(form(chromium, "/approve").find_element(By.NAME, "minutes")).select_by_value("5.0")
         press(chromium, "/approve")
@@ -241,6 +242,7 @@ def test_a_motion_is_watched_and_aborted(chromium, folder):
             enter(chromium, served, PHONE)
             wait(chromium, "h1", "Running")
             wait(chromium, "#steps", "of 500 commands")
+            wait(chromium, "main", "The start command runs.")
             seen = sent(chromium)
             WebDriverWait(chromium, SECONDS).until(lambda page: sent(page) > seen + 5)
             assert chromium.find_element(By.CSS_SELECTOR, "tr[data-channel] th").text == "panda_joint1"
