@@ -150,3 +150,20 @@ def _collected(episodes: int, per_shard: int, session, tmp_path_factory: pytest.
         open_tracker(TrackingSettings(uri=f"sqlite:///{folder}/mlflow.db")),
     )
     return folder / "dataset"
+
+
+@pytest.fixture(scope="session")
+def hebi_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A Python with the maker's library of the hexapod, where that can be installed; and a tape measure."""
+    folder = tmp_path_factory.mktemp("hebi")
+    subprocess.run([sys.executable, "-m", "venv", folder / "environment"], check=True)
+    inside = folder / "environment" / "bin"
+    wanted = [inside / "pip", "install", "-q", "hebi-py==2.16.1", "jaxtyping==0.3.11"]
+    done = subprocess.run(wanted, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"hebi-py cannot be installed here: {done.stderr[-200:]}")
+    (folder / "tape.py").write_text("def walked():\n    return 1.5\n")
+    python = folder / "python"
+    python.write_text(f'#!/bin/sh\ncd {folder} && exec {inside / "python"} "$@"\n')
+    python.chmod(0o700)
+    return python

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.workers.drivers.hexapod import hexapod
 from workers import setups
 from workers.hardware import robots
 from workers.hardware.driver import Measurement, Motion, RobotDriver, RobotFault, RobotStopped
@@ -74,9 +75,13 @@ def documented(lab, port="/dev/ttyUSB0") -> Robot:
     return names["ARM"]
 
 
-@pytest.fixture(scope="module", params=[*REHEARSALS, "lab-arm"])
-def robot(request, lab):
-    return robots.find(request.param) if request.param in REHEARSALS else documented(lab)
+@pytest.fixture(scope="module", params=[*REHEARSALS, "lab-arm", pytest.param("hebi", marks=pytest.mark.slow)])
+def robot(request):
+    if request.param in REHEARSALS:
+        return robots.find(request.param)
+    if request.param == "hebi":
+        return hexapod(request.getfixturevalue("hebi_python"))
+    return documented(request.getfixturevalue("lab"))
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,7 @@ NOT_RUN = {
     "docs/how-to/pictures.md": 2,
     "docs/how-to/plug-ins.md": 6,
     "docs/how-to/reproduce.md": 2,
+    "docs/how-to/hebi.md": 3,
     "docs/how-to/ten-trials.md": 1,
     "docs/how-to/train.md": 2,
     "docs/results/benchmarks.md": 1,
