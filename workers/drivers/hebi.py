@@ -28,7 +28,7 @@ LISTEN_SECONDS = 2.0
 
 
 class HebiHexapod(RobotMachine):
-    """Eighteen modules, in the order of the setup's joints: legs LF RF LM RM LB RB, each base, shoulder, elbow.
+    """Eighteen modules in the order of the setup's joints: legs LF RF LM RM LB RB; base, shoulder, elbow.
 
     Args:
         names: of the modules, in that order; none for the maker's imitation, which moves nothing.

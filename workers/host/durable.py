@@ -59,7 +59,7 @@ def replace(path: Path, content: bytes, mode: int = 0o666) -> None:
 def create(path: Path, content: bytes) -> bool:
     """Write a file, unless there is one; of several who try at once, one succeeds.
 
-    Others see it at once, before it is on disk: a slow disk delays nobody who only asks whether it is there.
+    Others see it at once, and a slow disk delays nobody; it is on disk after `sync`.
 
     Args:
         path: of the file.
@@ -73,20 +73,27 @@ def create(path: Path, content: bytes) -> bool:
     """
     unfinished = _beside(path)
     try:
-        with unfinished.open("wb") as file:
-            file.write(content)
-            file.flush()
-            try:
-                os.link(unfinished, path)
-            except FileExistsError:
-                return False
-            except OSError:  # a file system without hard links
-                unfinished.replace(path)
-            os.fsync(file.fileno())
+        unfinished.write_bytes(content)
+        try:
+            os.link(unfinished, path)
+        except FileExistsError:
+            return False
+        except OSError:  # a file system without hard links
+            unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
-    sync_folder(path.parent)
     return True
+
+
+def sync(path: Path) -> None:
+    """Make a file and its name durable.
+
+    Raises:
+        OSError: there is none, or the disk is broken.
+    """
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+    sync_folder(path.parent)
 
 
 def _beside(path: Path) -> Path:

@@ -42,7 +42,7 @@ class Latch:
         return self.path.exists()
 
     def set(self, stop: Stop) -> bool:
-        """Stop the robot; an earlier stop stays the one that is told.
+        """Stop the robot, as everybody sees from now on; an earlier stop stays the one that is told.
 
         Args:
             stop: why.
@@ -57,6 +57,14 @@ class Latch:
             return False
         at = datetime.now(timezone.utc).isoformat(timespec="seconds")  # noqa: UP017 - also for Python 3.10
         return durable.create(self.path, json.dumps({**asdict(stop), "at": at}).encode() + b"\n")
+
+    def keep(self) -> None:
+        """Let the stop outlast a power cut.
+
+        Raises:
+            OSError: it is not set, or the disk is broken.
+        """
+        durable.sync(self.path)
 
     def read(self) -> "Stop | None":
         """Why the robot is stopped; None when it is not."""

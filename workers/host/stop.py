@@ -43,6 +43,8 @@ class Answer:
 def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> Answer:
     """Stop a robot: set its latch, then tell its host, which needs neither Ray nor the campaign's process.
 
+    The disk is waited for last: the host need not be.
+
     Args:
         home: of the robot.
         stop: who and why.
@@ -52,7 +54,7 @@ def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> 
         What the host said; not `reached` where there is none, or where it hangs. The latch is set anyway.
 
     Raises:
-        OSError: the latch could not be written, and no host answered.
+        OSError: the latch could not be written for good, and no host answered.
     """
     trouble: OSError | None = None
     try:
@@ -60,6 +62,10 @@ def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> 
     except OSError as error:
         trouble = error
     answer = _ask_host(home.socket, stop, patience)
+    try:
+        home.latch.keep()
+    except OSError as error:
+        trouble = trouble or error
     if trouble is not None and not answer.reached:
         raise trouble
     return answer

@@ -1,4 +1,4 @@
-"""The paper's hexapod against its maker's imitation: order, units, rests. What it does not prove is on its page."""
+"""The paper's hexapod against its maker's imitation: order, units, rests; its page says what that is not."""
 
 import json
 import os
