@@ -269,7 +269,7 @@ GUARDS = (
     ),
     Guard(
         "one wrong number misleads every suggestion",
-        "cluster/hardware/operator.py",
+        "cluster/hardware/record/resolution.py",
         "    if not low <= f <= high:\n",
         "    if False:\n",
         ("tests/cluster/hardware/test_operator.py", "rules_out"),

@@ -1,14 +1,15 @@
 "use strict";
 // Comfort alone: every page works without. It tells when a page is out of date, and shows a motion while it lasts.
 const stop = document.getElementById("stop");
-document.addEventListener("keydown", event => { if (event.key === "Escape" && stop) stop.submit(); });
+document.addEventListener("keydown", event => { if (event.key === "Escape" && stop) stop.requestSubmit(); });
 
 for (const form of document.querySelectorAll("form[data-pause]")) {
   const button = form.querySelector("button");
   button.disabled = true;  // nobody approves by a click that was meant for the page before
   setTimeout(() => { button.disabled = false; }, 2000);
 }
-let isEdited = false;
+let isEdited = false, isLeaving = false;
+for (const form of document.forms) form.addEventListener("submit", () => { isLeaving = true; });  // its answer is the next page
 for (const form of document.querySelectorAll("main form")) {
   form.addEventListener("input", () => { isEdited = true; });
   form.addEventListener("submit", () => { setTimeout(() => { for (const button of form.querySelectorAll("button")) button.disabled = true; }); });
@@ -24,6 +25,7 @@ function listen() {
   source.onmessage = event => {
     heard = Date.now();
     silent.hidden = true;
+    if (isLeaving) return;
     const told = JSON.parse(event.data);
     if (told.mark === mark) show(told.live);
     else if (isEdited || location.pathname !== "/") outdated.hidden = false;
