@@ -6,6 +6,7 @@ form, over HTTP to the process that answers STOP: from a program, and from Chrom
 
 import argparse
 import os
+import random
 import shutil
 import socket
 import subprocess
@@ -63,6 +64,7 @@ def service(folder: Path) -> Iterator[str]:
 def one_stop(folder: Path, press: Callable[[], float]) -> float:
     """Seconds from the press to the last command; the robot's past is forgotten afterwards."""
     with running(folder) as (_, log):
+        time.sleep(random.uniform(0.0, 0.02))  # at any moment between two commands
         asked = press()
         time.sleep(0.1)  # for a command that should not come
         after = [moment - asked for moment in commands(log) if moment > asked]

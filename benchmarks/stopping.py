@@ -7,6 +7,7 @@ another and back, measured in the same run, says how busy the machine is.
 
 import argparse
 import os
+import random
 import signal
 import statistics
 import subprocess
@@ -68,6 +69,7 @@ def one_stop(state: str) -> float:
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
         STATES[state](Path(name)) as (home, log),
     ):
+        time.sleep(random.uniform(0.0, 0.02))  # at any moment between two commands
         asked = now()
         stop.request(home, Stop("benchmark", state))
         time.sleep(0.1)  # for a command that should not come
