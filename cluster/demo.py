@@ -36,7 +36,7 @@ class DemoSize:
     """
 
     episodes: int = 2048
-    updates: int = 1200
+    updates: int = 500
     methods: tuple[str, ...] = ("random", "screened-random", "se", "svae", OURS)
     runs: int = 6
     trials: int = 10
