@@ -52,11 +52,16 @@ class Person:
 
     Attributes:
         name: as the journal will know them.
-        role: what they may do.
+        token: that they entered with.
     """
 
     name: str
-    role: Role
+    token: Token
+
+    @property
+    def role(self) -> Role:
+        """What they may do."""
+        return self.token.role
 
 
 class AccessTokens:
@@ -129,13 +134,12 @@ class AccessTokens:
         asked, found = _hash(token), None
         for name, each in self.all().items():  # all of them, so that the time tells nothing
             if hmac.compare_digest(each.sha256, asked):
-                found = Person(name, each.role)
+                found = Person(name, each)
         return found
 
     def knows(self, person: Person) -> bool:
-        """Whether a person still has the token of that role."""
-        token = self.all().get(person.name)
-        return token is not None and token.role is person.role
+        """Whether a person's token is still the one that they entered with."""
+        return self.all().get(person.name) == person.token
 
     def _alone(self) -> AbstractContextManager[None]:
         return durable.exclusively(self._path.with_suffix(".lock"))

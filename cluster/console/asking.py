@@ -72,42 +72,6 @@ async def fields(request: Request) -> Mapping[str, str]:
         raise HTTPException(400, "a form has at most 50 fields") from error
 
 
-def decider(request: Request, form: Annotated[Mapping[str, str], Depends(fields)]) -> Person:
-    """Tell which operator sent a form.
-
-    Args:
-        request: with its form.
-        form: its fields.
-
-    Returns:
-        The operator.
-
-    Raises:
-        HTTPException: somebody else, or a form that is not of their own pages.
-    """
-    return operator_with(request, form.get("key", ""))
-
-
-def operator_with(request: Request, key: str) -> Person:
-    """Tell which operator asks.
-
-    Args:
-        request: from a browser or a program.
-        key: that its form holds.
-
-    Returns:
-        The operator.
-
-    Raises:
-        HTTPException: somebody else, or a form that is not of their own pages.
-    """
-    session = visitor(request)
-    if not session.person.role.may(Role.OPERATOR):
-        raise HTTPException(403, f"{session.person.name} may look, and not decide")
-    require_own_form(session, key)
-    return session.person
-
-
 def require_own_form(session: BrowserSession, key: str) -> None:
     """Refuse a form that another site made.
 
@@ -162,4 +126,38 @@ def wants_json(request: Request) -> bool:
 Ours = Annotated[Console, Depends(console_of)]
 Visitor = Annotated[BrowserSession, Depends(visitor)]
 Form = Annotated[Mapping[str, str], Depends(fields)]
+
+
+def operator_in(session: BrowserSession, key: str) -> Person:
+    """Tell which operator asks.
+
+    Args:
+        session: of who asks.
+        key: that their form holds.
+
+    Returns:
+        The operator.
+
+    Raises:
+        HTTPException: they may not decide, or the form is not of their own pages.
+    """
+    if not session.person.role.may(Role.OPERATOR):
+        raise HTTPException(403, f"{session.person.name} may look, and not decide")
+    require_own_form(session, key)
+    return session.person
+
+
+def decider(session: Visitor, form: Form) -> Person:
+    """Tell which operator sent a form; see `operator_in`.
+
+    Args:
+        session: of who sends it.
+        form: its fields.
+
+    Returns:
+        The operator.
+    """
+    return operator_in(session, form.get("key", ""))
+
+
 Decider = Annotated[Person, Depends(decider)]

@@ -14,8 +14,9 @@ from cluster.console.asking import (
     Decider,
     Form,
     Ours,
+    Visitor,
     number_in,
-    operator_with,
+    operator_in,
     version_in,
     visitor,
     wants_json,
@@ -74,10 +75,10 @@ def amend(console: Ours, request: Request, number: int, who: Decider, form: Form
 
 
 @router.post("/attach")
-async def attach(console: Ours, request: Request, number: int) -> Response:
+async def attach(console: Ours, request: Request, session: Visitor, number: int) -> Response:
     """Keep a file with a trial."""
     async with request.form(max_files=1, max_fields=5, max_part_size=64 * 1024) as form:
-        who = await asyncio.to_thread(operator_with, request, str(form.get("key", "")))
+        who = operator_in(session, str(form.get("key", "")))
         file, note = form.get("file"), _note(str(form.get("note", "")))
         if file is None or isinstance(file, str):
             raise UsageError("choose a file to attach")

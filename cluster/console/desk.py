@@ -2,12 +2,12 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from cluster.hardware import journal, operator
-from cluster.hardware.events import CampaignTrial, Event, utc_now
+from cluster.hardware.events import CampaignTrial, Event
 from cluster.hardware.record import opening
 from cluster.hardware.record.attachments import Attachment, attachments
 from cluster.hardware.record.foresight import FOLDER as PREVIEWS
@@ -64,6 +64,11 @@ class View:
             return "The start command runs."
         return f"The robot is held by {self.holder}."
 
+    def pulse(self) -> dict[str, Any]:
+        """What open pages are told a few times a second: `mark`, `phase`, `stopped`, `live`."""
+        phase = str(self.status.phase)
+        return {"mark": self.mark, "phase": phase, "stopped": self.stopped, "live": dict(self.live)}
+
     def events_of(self, number: int) -> list[Event]:
         """Every event of a trial, oldest first."""
         return [event for event in self.events if event.trial == number]
@@ -102,8 +107,8 @@ class Desk:
         Raises:
             UserError: something of it cannot be read, or is damaged.
         """
-        status = operator.status(self.folder)
         with opening.to_read(self.folder) as opened:
+            status = operator.status_of(self.folder, opened)
             found, events = rows(opened), opened.events()
         stopped = str(self.home.latch.read() or "")
         mark = f"{len(events)} {status.phase} {bool(stopped)}"
@@ -111,25 +116,13 @@ class Desk:
         seen = self._live_motion(status)
         return View(status, found, events, files, stopped, holder, seen, mark)
 
-    def pulse(self) -> dict[str, Any]:
-        """What open pages are told a few times a second: `mark`, `phase`, `stopped`, `live`, `now`."""
-        view = self.look()
-        return {
-            "mark": view.mark,
-            "phase": str(view.status.phase),
-            "stopped": view.stopped,
-            "live": dict(view.live),
-            "now": utc_now().isoformat(timespec="seconds"),
-        }
+    def look_again(self, view: View) -> View:
+        """The same, where nothing has changed but the motion under way."""
+        return replace(view, live=self._live_motion(view.status))
 
     def signature(self) -> tuple[int, ...]:
-        """Changes when anything has; cheap enough to be asked for all the time."""
-        files = (
-            self.folder / journal.FILE,
-            self.folder / f"{journal.FILE}-wal",
-            self.home.latch.path,
-            self.home.live,
-        )
+        """Changes when anything has but the motion under way; cheap enough to be asked for all the time."""
+        files = (self.folder / journal.FILE, self.folder / f"{journal.FILE}-wal", self.home.latch.path)
         return tuple(_change_of(path) for path in files)
 
     def clip(self, number: int) -> Path | None:

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Depends, HTTPException, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response, StreamingResponse
 
 from cluster.console.asking import Console, Ours, Visitor, visitor
-from cluster.console.desk import CLIPS
+from cluster.console.desk import CLIPS, Desk, View
 from cluster.console.sessions import BrowserSession
 from cluster.errors import UserError
 from cluster.hardware.record.export import export
@@ -50,7 +50,8 @@ def trial(console: Ours, session: Visitor, number: int) -> str:
 @router.get("/state")
 def state(console: Ours) -> dict[str, Any]:
     """What `svaedc hardware status --json` prints, with the motion under way."""
-    return {**console.desk.pulse(), **console.desk.look().status.as_json()}
+    view = console.desk.look()
+    return {**view.pulse(), **view.status.as_json()}
 
 
 @router.get("/live")
@@ -100,20 +101,37 @@ def export_as(console: Ours, form: str) -> Response:
 
 async def _pulses(console: Console, request: Request, session: BrowserSession) -> AsyncIterator[str]:
     """An event whenever something changed, and every few seconds, so that silence means something."""
-    seen: tuple[int, ...] = ()
-    told, clock = -math.inf, asyncio.get_running_loop().time
+    pulses, told, sent = Pulses(console.desk), "", -math.inf
+    clock = asyncio.get_running_loop().time
     while not (console.closing.is_set() or await request.is_disconnected()):
         if not await asyncio.to_thread(console.tokens.knows, session.person):
             return
-        signature = await asyncio.to_thread(console.desk.signature)
-        if signature != seen or clock() - told > TELL_SECONDS:
-            seen, told = signature, clock()
-            yield await asyncio.to_thread(_pulse, console)
+        pulse = await asyncio.to_thread(pulses.next)
+        if pulse != told or clock() - sent > TELL_SECONDS:
+            told, sent = pulse, clock()
+            yield pulse
         await asyncio.sleep(LOOK_SECONDS)
 
 
-def _pulse(console: Console) -> str:
-    try:
-        return f"data: {json.dumps(console.desk.pulse())}\n\n"
-    except UserError as error:
-        return f"event: trouble\ndata: {json.dumps(str(error))}\n\n"
+class Pulses:
+    """What one open page is told; the journal is read again only where it has changed.
+
+    Args:
+        desk: of the campaign.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._signature: tuple[int, ...] = ()
+        self._view: View | None = None
+
+    def next(self) -> str:
+        """One event, as the stream has it."""
+        try:
+            signature = self._desk.signature()
+            unchanged = self._view if signature == self._signature else None
+            self._view = self._desk.look_again(unchanged) if unchanged else self._desk.look()
+            self._signature = signature
+        except UserError as error:
+            return f"event: trouble\ndata: {json.dumps(str(error))}\n\n"
+        return f"data: {json.dumps(self._view.pulse())}\n\n"

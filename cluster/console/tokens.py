@@ -5,6 +5,7 @@ from pathlib import Path
 
 from cluster.console.access import AccessTokens, Role
 from cluster.errors import UsageError
+from cluster.hardware.events import moment_in_words
 from cluster.hardware.robot.residence import home_of, robot_errors
 
 
@@ -36,6 +37,6 @@ def change(robot: str, home: Path | None, add: str | None, role: str, revoke: st
             yield f"the token of {add}, {role}, shown this once: {tokens.issue(add, Role(role))}"
     known = tokens.all()
     for name, each in known.items():
-        yield f"{name}: {each.role}, since {each.since.partition('.')[0].replace('T', ' ')} UTC"
+        yield f"{name}: {each.role}, since {moment_in_words(each.since)} UTC"
     if not known:
         yield f"nobody may enter the console of {robot} yet"

@@ -163,6 +163,11 @@ def broken_link(events: Iterable[Event], genesis: str) -> str | None:
     return None
 
 
+def moment_in_words(at: str) -> str:
+    """A moment of UTC, ISO 8601, for people: to the second, without its zone."""
+    return at.partition(".")[0].replace("T", " ")
+
+
 def utc_now() -> datetime:
     """Now, in UTC."""
     return datetime.now(UTC)

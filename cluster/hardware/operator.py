@@ -33,7 +33,21 @@ def status(folder: Path) -> Status:
     Raises:
         JournalError: when there is none, or its journal is damaged.
     """
-    with opening.to_read(folder) as opened, residence.robot_errors():
+    with opening.to_read(folder) as opened:
+        return status_of(folder, opened)
+
+
+def status_of(folder: Path, opened: Journal) -> Status:
+    """How a campaign stands whose journal is open.
+
+    Args:
+        folder: of the campaign.
+        opened: its journal.
+
+    Returns:
+        The same as `status`.
+    """
+    with residence.robot_errors():
         return look(opened, lock.holder(folder), _gate(folder, opened))
 
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from cluster.hardware.events import CampaignTrial, utc_now
+from cluster.hardware.events import CampaignTrial, moment_in_words, utc_now
 from cluster.hardware.identity import CampaignIdentity
 from cluster.hardware.journal import Journal
 from cluster.hardware.lock import Process
@@ -242,7 +242,7 @@ def _reason(journal: Journal, number: int) -> str:
 def _since(journal: Journal, number: int) -> str:
     """When a trial came to where it stands."""
     last = journal.last_event(number)
-    return last.at.partition(".")[0].replace("T", " ") + " UTC"
+    return f"{moment_in_words(last.at)} UTC"
 
 
 def _on_record(journal: Journal) -> str:

@@ -134,15 +134,23 @@ LATENT_SIZES: Final = {
 (hidden 256) and a 180-D one (hidden up to 1024)."""
 
 
-_PRIOR_HIDDEN: Final = {
-    "mlp": (384, 384, 384),
-    "deconv": (512, 256, 128, 128),
-    "plan": (96, 160, 160, 256),
+class _PriorHabits(NamedTuple):
+    """How a kind of p(tau, psi|x) is built and trained.
+
+    What reads plans can learn them by heart, and what a plan tells of badness drowns in the elements of xi.
+    """
+
+    hidden: tuple[int, ...]
+    dropout: float = 0.0
+    weight_decay: float = 0.0
+    y_weight: float = 1.0
+
+
+_PRIORS: Final = {
+    "mlp": _PriorHabits((384, 384, 384)),
+    "deconv": _PriorHabits((512, 256, 128, 128)),
+    "plan": _PriorHabits((96, 160, 160, 256), dropout=0.1, weight_decay=1e-2, y_weight=30.0),
 }
-_REGULARISED: Final = {"mlp": (0.0, 0.0), "deconv": (0.0, 0.0), "plan": (0.1, 1e-2)}
-"""Dropout and weight decay: what reads plans can learn them by heart."""
-_Y_WEIGHTS: Final = {"mlp": 1.0, "deconv": 1.0, "plan": 30.0}
-"""Of log p(y|psi): what a plan tells of badness drowns in the elements of xi otherwise."""
 
 
 def vary(preset: Preset, changes: Mapping[str, Any]) -> Preset:
@@ -202,12 +210,12 @@ def _head(preset: Preset, value: str) -> Preset:
 
 
 def _prior(preset: Preset, value: str) -> Preset:
-    hidden = _chosen("prior", value, _PRIOR_HIDDEN)
-    dropout, decay = _REGULARISED[value]
-    joint = replace(preset.training.joint, dropout=dropout, weight_decay=decay)
-    weighting = replace(preset.training.weighting, y=_Y_WEIGHTS[value])
-    model = replace(preset.model, prior=value, prior_hidden=hidden)
-    return Preset(model, replace(preset.training, joint=joint, weighting=weighting))
+    habits: _PriorHabits = _chosen("prior", value, _PRIORS)
+    training = preset.training
+    joint = replace(training.joint, dropout=habits.dropout, weight_decay=habits.weight_decay)
+    weighting = replace(training.weighting, y=habits.y_weight)
+    model = replace(preset.model, prior=value, prior_hidden=habits.hidden)
+    return Preset(model, replace(training, joint=joint, weighting=weighting))
 
 
 def _weighting(preset: Preset, value: str) -> Preset:

@@ -6,7 +6,7 @@ import socket
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ class Answer:
         last_command: when the host sent its last command, in s of `guard.now`; 0 for none.
         rest: what the robot's motors do after a stop, as its driver declares.
         pid: of the host; 0 where none answered.
+        first: whether the robot was not stopped before, as far as its latch could be read.
     """
 
     reached: bool
@@ -38,6 +39,7 @@ class Answer:
     last_command: float = 0.0
     rest: str = ""
     pid: int = 0
+    first: bool = True
 
 
 def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> Answer:
@@ -57,8 +59,9 @@ def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> 
         OSError: the latch could not be written for good, and no host answered.
     """
     trouble: OSError | None = None
+    first = True
     try:
-        home.latch.set(stop)
+        first = home.latch.set(stop)
     except OSError as error:
         trouble = error
     answer = _ask_host(home.socket, stop, patience)
@@ -68,7 +71,7 @@ def request(home: RobotHome, stop: Stop, patience: float = PATIENCE_SECONDS) -> 
         trouble = trouble or error
     if trouble is not None and not answer.reached:
         raise trouble
-    return answer
+    return replace(answer, first=first)
 
 
 def _ask_host(path: Path, stop: Stop, patience: float) -> Answer:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cluster.hardware.events import Event
+from cluster.hardware.events import Event, moment_in_words
 from cluster.hardware.record.attachments import Attachment
 from cluster.hardware.states import State
 from workers.hardware import robots
@@ -128,4 +128,4 @@ def number(value: Any) -> str:
 
 def when(at: str | None) -> str:
     """A moment for people; "" for none."""
-    return "" if at is None else at.partition(".")[0].replace("T", " ")
+    return "" if at is None else moment_in_words(at)

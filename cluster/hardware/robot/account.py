@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cluster.errors import UserError
-from cluster.hardware.events import utc_now
+from cluster.hardware.events import moment_in_words, utc_now
 from cluster.hardware.robot.residence import homes_of, robot_errors
 from workers.hardware.gate import Gate
 from workers.hardware.wear import wear
@@ -45,7 +45,7 @@ def _lines(home: RobotHome) -> Iterator[str]:
     moved = f"{worn.commands} commands in {worn.seconds:.1f} s of motion"
     yield f"  moved by {worn.trials} trials{broken}: {moved}"
     if worn.trials:
-        last = max(entry.at for entry in entries if entry.event == STARTED).partition(".")[0]
-        yield f"  last at {last.replace('T', ' ')} UTC; it is {utc_now():%Y-%m-%d %H:%M} now"
+        last = max(entry.at for entry in entries if entry.event == STARTED)
+        yield f"  last at {moment_in_words(last)} UTC; it is {utc_now():%Y-%m-%d %H:%M} now"
     for name, distance in worn.travel.items():
         yield f"    {name:<20} sent over {distance:10.2f} in all"

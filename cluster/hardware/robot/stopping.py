@@ -88,20 +88,11 @@ def clear(robot: str, home: Path | None, who: str, note: str) -> str:
 
 
 def _stop_at(home: RobotHome, asked: Stop) -> Stopping:
-    first = _latch(home, asked)
     answer = way.request(home, asked)
     killed = not answer.reached and _kill(home)
-    if first:
+    if answer.first:
         _note(home, STOPPED, {"who": asked.who, "reason": asked.reason})
     return Stopping(answer, killed, _advice(home, answer, killed), bool(home.holder()))
-
-
-def _latch(home: RobotHome, asked: Stop) -> bool:
-    """Whether this stop is to be noted: not where the robot was stopped before."""
-    try:
-        return home.latch.set(asked)
-    except OSError:  # the request tries again, and tells
-        return True
 
 
 def _existing(robot: str, home: Path | None) -> tuple[RobotHome, ...]:

@@ -55,19 +55,21 @@ WorldsOf = Callable[[Tensor], Worlds]
 
 
 class SimulatedMean(Mean):
-    r"""The mean \bar f(x).
+    r"""The mean \bar f(x) - caution s(x).
 
     Args:
         worlds: Takes what simulation showed out of rows of features.
+        caution: Weight of the spread s.
     """
 
-    def __init__(self, worlds: WorldsOf) -> None:
+    def __init__(self, worlds: WorldsOf, caution: float = 0.0) -> None:
         super().__init__()
-        self._worlds = worlds
+        self._worlds, self._caution = worlds, caution
 
     def forward(self, x: Tensor) -> Tensor:
         """Means [..., n] of rows of features [..., n, k + 2 e]."""
-        return self._worlds(x).f.mean(dim=-1)
+        f = self._worlds(x).f
+        return f.mean(dim=-1) - self._caution * spread(f)
 
 
 Regressors = Callable[[Worlds], Tensor]

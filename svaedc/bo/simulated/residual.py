@@ -14,15 +14,12 @@ from typing import Final
 
 import torch
 from gpytorch.kernels import ConstantKernel, Kernel, RBFKernel, ScaleKernel
-from gpytorch.means import Mean
-from torch import Tensor
 
 from svaedc.bo.candidates import Problem, by_latents
 from svaedc.bo.features import Embedding, svae, svae_dc
 from svaedc.bo.gp import condition
 from svaedc.bo.kernels import Embedded
-from svaedc.bo.simulated.outcomes import spread
-from svaedc.bo.simulated.prior import WorldsOf, with_simulations, worlds_behind
+from svaedc.bo.simulated.prior import SimulatedMean, with_simulations, worlds_behind
 from svaedc.bo.surrogates import Surrogate
 
 CAUTION: Final = 0.5
@@ -32,23 +29,6 @@ NOISE: Final = 0.15
 """These are in parts of the range of objectives."""
 LENGTHSCALE: Final = 0.3
 """It is in parts of the root-mean-square distance between candidates."""
-
-
-class CautiousMean(Mean):
-    r"""The mean \bar f(x) - `CAUTION` s(x).
-
-    Args:
-        worlds: Takes what simulation showed out of rows of features.
-    """
-
-    def __init__(self, worlds: WorldsOf) -> None:
-        super().__init__()
-        self._worlds = worlds
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Means [..., n] of rows of features [..., n, k + 2 e]."""
-        f = self._worlds(x).f
-        return f.mean(dim=-1) - CAUTION * spread(f)
 
 
 def on_paths(problem: Problem) -> Surrogate:
@@ -83,7 +63,7 @@ def _on_latents(embedding: Embedding, problem: Problem) -> Surrogate:
     process = partial(
         condition,
         lambda: Embedded(_nearby(), features) + _shift(),
-        mean=lambda: CautiousMean(worlds),
+        mean=lambda: SimulatedMean(worlds, CAUTION),
         noise=NOISE**2,
     )
     return Surrogate(with_simulations(compared, problem), process, problem.objective_limits)

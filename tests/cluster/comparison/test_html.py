@@ -1,6 +1,5 @@
 """The report page: whole, offline, and honest about what was not reached."""
 
-import shutil
 import subprocess
 from base64 import b64encode
 from dataclasses import replace
@@ -12,6 +11,7 @@ import pytest
 from cluster.comparison.html import page
 from svaedc.analysis.aggregation import summarize
 from svaedc.analysis.summary import Reporting, Row
+from tests import chromium
 
 
 def rows(methods: dict[str, float], first_seed: int, runs: int = 2) -> list[Row]:
@@ -139,9 +139,6 @@ document.title = "cut: " + boxes.filter(each => each.scrollWidth > each.clientWi
 
 @pytest.mark.parametrize("width", [1300, 390])
 def test_nothing_is_cut_on_a_screen_or_on_a_phone(width, tmp_path):
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("no chromium on PATH; `.ci/run` installs it")
     rng = np.random.default_rng(0)
     names = ("random", "svae-dc-matern-acqf", "screened-random")
     given = [
@@ -157,12 +154,7 @@ def test_nothing_is_cut_on_a_screen_or_on_a_phone(width, tmp_path):
     text = page("title", summarize(given, reporting, rng), [figure], 2, settings)
     path = tmp_path / "report.html"
     path.write_text(text.replace("</body>", f"{WIDTHS}</body>").replace("<details", "<details open"))
-    command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    command += [
-        "--no-first-run",
-        "--disable-background-networking",
-        f"--user-data-dir={tmp_path / 'profile'}",
-    ]
-    command += [f"--window-size={width},900", "--dump-dom", path.as_uri()]
+    options = (f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={width},900")
+    command = chromium.command(*options, "--dump-dom", path.as_uri())
     shown = subprocess.run(command, capture_output=True, text=True, check=True, timeout=240).stdout
     assert "<title>cut: 0</title>" in shown

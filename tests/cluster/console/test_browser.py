@@ -1,6 +1,5 @@
 """Every action of the console in a real browser, on a desk and on a phone."""
 
-import shutil
 import subprocess
 import sys
 import time
@@ -14,21 +13,16 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from cluster.hardware.record.attachments import attachments
+from tests.chromium import QUIET, found
 from tests.cluster.console.served import awaiting_approval, book, measured, serving, unknown
 from workers.host.home import RobotHome
 
 PHONE, DESK = (390, 844), (1280, 900)
-QUIET = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
-    "--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage",
-)  # fmt: skip
 SECONDS = 60
 
 
 def driver(profile, *, scripts=True):
-    chromium, service = shutil.which("chromium"), shutil.which("chromedriver")
-    if chromium is None or service is None:
-        pytest.skip("no chromium with its driver on PATH; `.ci/run` installs them")
+    chromium, service = found("chromium", "chromedriver")
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     for option in (*QUIET, f"--user-data-dir={profile}"):

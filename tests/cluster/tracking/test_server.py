@@ -1,6 +1,5 @@
 """The store's real pages in a real browser."""
 
-import shutil
 import signal
 import socket
 import subprocess
@@ -12,6 +11,7 @@ import pytest
 
 from cluster.errors import UserError
 from cluster.tracking.server import serve_ui
+from tests import chromium
 
 REPOSITORY = Path(__file__).parents[3]
 
@@ -47,13 +47,8 @@ def answers(port: int) -> bool:
 
 def browse(page: str, profile: Path) -> str:
     """What a browser shows of a page, once its scripts had time to run."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("no chromium on PATH; `.ci/run` installs it")
-    command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
-    command += ["--no-first-run", "--disable-background-networking", "--disable-component-update"]
-    command += ["--disable-sync", "--disable-dev-shm-usage", f"--user-data-dir={profile}"]
-    command += ["--window-size=1400,900", "--virtual-time-budget=30000", "--dump-dom", page]
+    options = (f"--user-data-dir={profile}", "--window-size=1400,900", "--virtual-time-budget=30000")
+    command = chromium.command(*options, "--dump-dom", page)
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=240).stdout
 
 
